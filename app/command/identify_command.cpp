@@ -58,8 +58,7 @@ void add_gap(std::vector<double>& times, double next, std::initializer_list<std:
 }
 
 // One plot per channel of each record. start holds the initial values; channels that it lacks are left out.
-std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTable>& data,
-                               const IdentificationResult& fit, const IdentificationResult& start) {
+std::vector<FitPlot> fit_plots(const IdentificationResult& fit, const IdentificationResult& start) {
   std::vector<FitPlot> plots;
   std::vector<std::size_t> first;  // plot of each experiment's first channel
   for (std::size_t e = 0; e < fit.experiments.size(); ++e) {
@@ -70,11 +69,10 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTabl
     }
     first.push_back(plots.size());
     for (std::size_t c = 0; c < experiment.channels.size(); ++c)
-      plots.push_back(
-          {.experiment = record_of(experiment),
-           .channel = without_unit(experiment.channels[c].column),
-           .unit = unit_of_channel(problem.scene, problem.identification->experiments[e].channels[c], data[e]),
-           .validates = experiment.validate});
+      plots.push_back({.experiment = record_of(experiment),
+                       .channel = without_unit(experiment.channels[c].column),
+                       .unit = experiment.channels[c].unit,
+                       .validates = experiment.validate});
   }
   std::vector<std::optional<std::size_t>> last(plots.size()), last_at_start(plots.size());  // experiment of a plot
   for (const ResidualRow& row : fit.residuals) {
@@ -97,6 +95,13 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTabl
     plot.initial_times.push_back(row.t), plot.initial.push_back(row.model);
   }
   return plots;
+}
+
+void set_units(IdentificationResult& fit, const Problem& problem, const std::vector<CsvTable>& data) {
+  for (std::size_t e = 0; e < fit.experiments.size(); ++e)
+    for (std::size_t c = 0; c < fit.experiments[e].channels.size(); ++c)
+      fit.experiments[e].channels[c].unit =
+          unit_of_channel(problem.scene, problem.identification->experiments[e].channels[c], data[e]);
 }
 
 // An experiment ends with its data, not with the scene's time.
@@ -334,17 +339,15 @@ FittedMotion fitted_motion(Run& run, const Problem& needed, const std::vector<Cs
 }
 
 // The report omits motions if a simulation stopped. start holds all experiments.
-std::string report_of(const Run& run, const CutProblem& cut, const SimulatedExperiment& before,
-                      const IdentificationResult& start, const FittedMotion& motion, const IdentificationResult& fit,
-                      const Trajectory& history) {
+std::string report_of(const Run& run, const SimulatedExperiment& before, const IdentificationResult& start,
+                      const FittedMotion& motion, const IdentificationResult& fit, const Trajectory& history) {
   std::vector<MovingState> states;
   const std::optional<SimulatedExperiment>& after = motion.after;
   if (after && after->simulation.ok()) {
     states.push_back({"initial", before.scene, before.trajectory, true});
     states.push_back({"fitted", after->scene, after->trajectory, false, motion.measured, after->forces});
   }
-  return identification_report(run.problem.scene, run.result, history, fit_plots(cut.problem, cut.data, fit, start),
-                               states);
+  return identification_report(run.problem.scene, run.result, history, fit_plots(fit, start), states);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {
@@ -406,6 +409,7 @@ int identify_command(const CommandContext& context) {
   IdentificationResult fit = cut_again ? fitted(run, long_run, best.problem, whole, cut.problem)
                                        : fitted(run, long_run, cut.problem, data, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
+  set_units(fit, cut.problem, data);
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, fit.simulations, fit.wall_seconds));
   for (const std::string& warning : fit.warnings) run.warn(warning);
@@ -423,7 +427,7 @@ int identify_command(const CommandContext& context) {
     run.failed(fit.message);
     if (other) run.warn("--compare: is skipped, since the fit did not converge");
   }
-  run.write("report.html", report_of(run, cut, before, start, motion, fit, history));
+  run.write("report.html", report_of(run, before, start, motion, fit, history));
   return long_run.finish();
 }
 
