@@ -356,7 +356,7 @@ std::string identification_report(const Scene& scene, const Json& result, const 
   page.heading("Measured and model");
   add_experiments(page, result);
   for (const FitPlot& fit : fits) add_fit(page, fit);
-  add_convergence(page, history, result.at("parameters"));
+  add_convergence(page, scene, history, result.at("parameters"));
   add_provenance(page, result);
   return page.text();
 }
