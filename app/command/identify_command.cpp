@@ -33,6 +33,7 @@
 #include "optim/fit/experiment.hpp"
 #include "optim/fit/fit_comparison.hpp"
 #include "optim/fit/identification.hpp"
+#include "optim/fit/parameter_profile.hpp"
 #include "optim/fit/recovery.hpp"
 #include "optim/fit/start_residuals.hpp"
 #include "optim/fit/unknown_parameters.hpp"
@@ -93,6 +94,13 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTabl
   // A fit that ended within its first evaluation has no residuals.
   std::erase_if(plots, [](const FitPlot& plot) { return plot.times.empty(); });
   return plots;
+}
+
+void set_units(IdentificationResult& fit, const Problem& problem, const std::vector<CsvTable>& data) {
+  for (std::size_t e = 0; e < fit.experiments.size(); ++e)
+    for (std::size_t c = 0; c < fit.experiments[e].channels.size(); ++c)
+      fit.experiments[e].channels[c].unit =
+          unit_of_channel(problem.scene, problem.identification->experiments[e].channels[c], data[e]);
 }
 
 // An experiment ends with its data, not with the scene's time.
@@ -381,6 +389,9 @@ int identify_command(const CommandContext& context) {
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(cut.problem, &left_out);
   say_left_out(run, left_out, "measurement");
+  if (!context.options.profiles.empty())  // before anything is fitted
+    profiled_unknowns(context.options.profiles,
+                      names_of(unknowns_of_fit(needed.scene, *needed.identification), *needed.identification));
   const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
   const bool cut_again = starts && !context.options.preflight;  // for the values of the best start, with its warnings
   for (std::size_t i = 0; !cut_again && i < cut.warnings.size(); ++i) run.warn(cut.warnings[i]);
@@ -399,6 +410,7 @@ int identify_command(const CommandContext& context) {
   IdentificationResult fit = cut_again ? fitted(run, long_run, best.problem, whole, cut.problem)
                                        : fitted(run, long_run, cut.problem, data, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
+  set_units(fit, cut.problem, data);
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, fit.simulations, fit.wall_seconds));
   for (const std::string& warning : fit.warnings) run.warn(warning);

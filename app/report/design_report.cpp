@@ -40,20 +40,19 @@ void add_design_verdict(HtmlPage& page, const Json& result) {
                            counted(static_cast<long>(result.at("parameters").size()), "variable")));
 }
 
-void add_parameters(HtmlPage& page, const Json& result) {
+void add_parameters(HtmlPage& page, const Scene& scene, const Json& result) {
   std::vector<TableRow> rows;
   RowPlot plot{.title = "Variables between their bounds (ring: start, dot: optimum)",
-               .x_label = "(value - lower)/(upper - lower) [-]",
+               .x_label = kBetween,
                .range = std::pair(-0.03, 1.03),
                .track = true};
   for (const auto& [name, p] : result.at("parameters").items()) {
     const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
     rows.push_back({name, number_cell(p.at("initial")), number_cell(p.at("value")), cell(p.value("unit", Json())),
                     number_cell(lower), number_cell(upper), cell(p.value("at_bound", Json()))});
-    if (!lower.is_number() || !upper.is_number()) continue;
-    const double l = lower.get<double>(), width = upper.get<double>() - l;
-    if (!(width > 0) || !std::isfinite(width)) continue;
-    const double from = (p.at("initial").get<double>() - l) / width, to = (p.at("value").get<double>() - l) / width;
+    const std::optional<Between> between = bounds_of(scene, name, p);
+    if (!between) continue;
+    const double from = (*between)(p.at("initial").get<double>()), to = (*between)(p.at("value").get<double>());
     plot.rows.push_back({.name = name,
                          .low = from,
                          .high = to,
@@ -159,11 +158,11 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
   add_status(page, result);
   page.heading("Result");
   add_outcome(page, result);
-  add_parameters(page, result);
+  add_parameters(page, scene, result);
   const Json& objectives = result.at("objectives");
-  add_convergence(page, history, result.at("parameters"),
+  add_convergence(page, scene, history, result.at("parameters"),
                   objectives.empty() ? kUnknownUnit : unit_of(*objectives.begin()));
-  add_multistart(page, result);
+  add_multistart(page, scene, result);
   page.heading("Motion before and after");
   add_drawings(page, scene, rho, before, after, targets);
   for (const LinePlot& plot : motion_plots(scene, before.trajectory, after.trajectory, limits)) page.plot(plot);

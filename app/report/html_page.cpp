@@ -16,6 +16,7 @@ namespace {
 // A cell of so many characters is a sentence, which wraps. The longest other cell, an interval of two numbers, has 30:
 // [-1.234567e-05, -1.234567e-05].
 constexpr std::size_t kWords = 32;
+constexpr std::size_t kUpright = 2;  // letters of a name that stands upright above a narrow column
 
 constexpr std::size_t kFewColumns = 8;  // they fit a printed page of 18 cm without breaks within words
 
@@ -80,8 +81,14 @@ void HtmlPage::table(const std::vector<std::string>& header, const std::vector<T
   body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", kind);
   if (named) {
     body_ += "<thead><tr>";
-    for (std::size_t k = 0; k < header.size(); ++k)
-      body_ += fmt::format("<th{}>{}</th>", words[k] ? " class=\"words\"" : "", html_escaped(header[k]));
+    for (std::size_t k = 0; k < header.size(); ++k) {
+      const bool is_short = dense && header[k].size() <= kUpright;
+      body_ += fmt::format("<th{}>{}</th>",
+                           words[k]   ? " class=\"words\""
+                           : is_short ? " class=\"upright\""
+                                      : "",
+                           html_escaped(header[k]));
+    }
     body_ += "</tr></thead>\n";
   }
   body_ += "<tbody>";

@@ -162,7 +162,7 @@ void add_experiments(HtmlPage& page, const Json& result) {
     for (const auto& [channel, fit] : experiment.at("channels").items()) {
       rows.push_back({name, channel, cell(experiment.at("role")), cell(fit.at("samples")), cell(fit.at("rms"), 4),
                       cell(fit.at("sigma"), 4) + (fit.at("sigma_is_estimated").get<bool>() ? " (estimated)" : ""),
-                      cell(fit.at("rms_scaled"), 4)});
+                      cell(fit.at("unit")), cell(fit.at("rms_scaled"), 4)});
       const Json& residuals = fit.at("residuals");
       tests.push_back({name, channel, cell(residuals.at("mean"), 3), cell(residuals.at("autocorrelation"), 3),
                        cell(residuals.at("ljung_box"), 3), cell(residuals.at("lags")),
@@ -170,11 +170,17 @@ void add_experiments(HtmlPage& page, const Json& result) {
                        cell(residuals.at("runs_p"), 2), cell(residuals.at("in_words"))});
     }
   }
-  page.table({"experiment", "channel", "role", "samples", "rms of measured - model", "sigma", "rms/sigma"}, rows);
+  page.table({"experiment", "channel", "role", "samples", "rms of measured - model", "sigma", "unit", "rms/sigma"},
+             rows);
   page.heading("Are the residuals noise?");
-  page.paragraph(
-      "Of white noise p is rarely below 0.01. Where it is, the model misses something, and the standard errors are too "
-      "small.");
+  page.paragraph(fmt::format(
+      "Of white noise p is below 0.01 in one of a hundred tests; here are {}. Where p is far below, the model misses "
+      "something. {}",
+      2 * tests.size(),
+      result.at("covariance") == "white"
+          ? "Then the standard errors, which take the residuals for white, are too small."
+          : "The standard errors allow for residuals that are correlated in time, but not "
+            "for a wrong model."));
   page.table({"experiment", "channel", "mean", "lag-1 autocorrelation", "Ljung-Box", "lags", "its p", "runs of signs",
               "their p", "in words"},
              tests);
@@ -350,7 +356,7 @@ std::string identification_report(const Scene& scene, const Json& result, const 
   page.heading("Measured and model");
   add_experiments(page, result);
   for (const FitPlot& fit : fits) add_fit(page, fit);
-  add_convergence(page, history, result.at("parameters"));
+  add_convergence(page, scene, history, result.at("parameters"));
   add_provenance(page, result);
   return page.text();
 }

@@ -150,7 +150,21 @@ void add_objectives(HtmlPage& page, const Json& result) {
   page.table(header, rows);
 }
 
-void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters, const std::string& unit) {
+double Between::operator()(double value) const {
+  return logarithmic ? std::log(value / lower) / std::log(upper / lower) : (value - lower) / (upper - lower);
+}
+
+std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p) {
+  const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
+  if (!lower.is_number() || !upper.is_number()) return std::nullopt;
+  const double l = lower.get<double>(), u = upper.get<double>();
+  if (!(u > l) || !std::isfinite(u - l)) return std::nullopt;
+  const auto parameter = std::ranges::find(scene.parameters, name.substr(name.rfind('.') + 1), &Parameter::name);
+  return Between{l, u, parameter != scene.parameters.end() && parameter->scale != ParameterScale::linear};
+}
+
+void add_convergence(HtmlPage& page, const Scene& scene, const Trajectory& history, const Json& parameters,
+                     const std::string& unit) {
   if (history.rows.size() < 2) return;
   page.heading("Convergence");
   const auto column = [&](std::size_t index) {
@@ -175,7 +189,7 @@ void add_convergence(HtmlPage& page, const Trajectory& history, const Json& para
   // Shows values between two bounds, else relative to the start.
   LinePlot bounded{.title = "Parameters between their bounds",
                    .x_label = "iteration",
-                   .y_label = "(value - lower)/(upper - lower) [-]",
+                   .y_label = kBetween,
                    .whole_x = true,
                    .limits = {{"lower bound", 0, false}, {"upper bound", 1, true}}};
   LinePlot free{.title = "Parameters", .x_label = "iteration", .y_label = "value/initial value [-]", .whole_x = true};
@@ -183,12 +197,10 @@ void add_convergence(HtmlPage& page, const Trajectory& history, const Json& para
     const auto found = std::find(history.columns.begin(), history.columns.end(), name);
     if (found == history.columns.end()) continue;
     std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
-    const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
-    const bool between = lower.is_number() && upper.is_number();
-    const double origin = between ? lower.get<double>() : 0;
-    const double width = between ? upper.get<double>() - origin : p.at("initial").get<double>();
-    if (width == 0 || !std::isfinite(width)) continue;
-    for (double& value : values) value = (value - origin) / width;
+    const std::optional<Between> between = bounds_of(scene, name, p);
+    const double initial = p.at("initial").get<double>();
+    if (!between && initial == 0) continue;
+    for (double& value : values) value = between ? (*between)(value) : value / initial;
     (between ? bounded : free).series.push_back({name, column(0), values, Mark::line});
   }
   for (const LinePlot& plot : {bounded, free})
@@ -196,15 +208,13 @@ void add_convergence(HtmlPage& page, const Trajectory& history, const Json& para
 }
 
 // Parallel coordinates: a line through the parameters of each start, each between its bounds.
-LinePlot parallel_coordinates(const Json& multistart, const Json& parameters) {
+LinePlot parallel_coordinates(const Scene& scene, const Json& multistart, const Json& parameters) {
   constexpr std::size_t kMost = 60;  // lines of one plot
-  LinePlot plot{
-      .title = "Where the starts ended", .x_label = "parameter", .y_label = "(value - lower)/(upper - lower) [-]"};
-  std::vector<std::array<double, 2>> bounds;
+  LinePlot plot{.title = "Where the starts ended", .x_label = "parameter", .y_label = kBetween};
+  std::vector<Between> bounds;
   for (const auto& [name, p] : parameters.items()) {
-    const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
-    if (!lower.is_number() || !upper.is_number()) continue;
-    plot.x_names.push_back(name), bounds.push_back({lower.get<double>(), upper.get<double>()});
+    const std::optional<Between> between = bounds_of(scene, name, p);
+    if (between) plot.x_names.push_back(name), bounds.push_back(*between);
   }
   const std::size_t best = multistart.at("at_the_best_optimum").get<std::size_t>();
   std::optional<std::size_t> first_other;  // the series that stands for all other optima
@@ -219,8 +229,7 @@ LinePlot parallel_coordinates(const Json& multistart, const Json& parameters) {
     for (std::size_t k = 0; k < bounds.size(); ++k) {
       const Json value = record.at("parameters").value(plot.x_names[k], Json());
       series.x.push_back(static_cast<double>(k));
-      series.y.push_back(value.is_number() ? (value.get<double>() - bounds[k][0]) / (bounds[k][1] - bounds[k][0])
-                                           : NAN);
+      series.y.push_back(value.is_number() ? bounds[k](value.get<double>()) : NAN);
     }
     plot.series.push_back(std::move(series));
   }
@@ -233,7 +242,7 @@ std::string minimised_unit(const Json& result) {
   return objectives.empty() ? "-" : unit_of(*objectives.begin());
 }
 
-void add_multistart(HtmlPage& page, const Json& result) {
+void add_multistart(HtmlPage& page, const Scene& scene, const Json& result) {
   if (!result.contains("multistart") || !result.at("multistart").contains("waterfall")) return;
   const Json& multistart = result.at("multistart");
   page.heading("Starts");
@@ -259,7 +268,7 @@ void add_multistart(HtmlPage& page, const Json& result) {
   plot.logarithmic_y =
       !series.y.empty() && std::all_of(series.y.begin(), series.y.end(), [](double y) { return y > 0; });
   if (!series.y.empty()) page.plot(plot);
-  const LinePlot ends = parallel_coordinates(multistart, result.value("parameters", Json::object()));
+  const LinePlot ends = parallel_coordinates(scene, multistart, result.value("parameters", Json::object()));
   if (ends.series.size() > 1 && ends.x_names.size() > 1) page.plot(ends);
   page.table({"start", "objective", "infeasibility", "optimality", "outcome"}, rows);
   if (multistart.at("optima").empty()) return;

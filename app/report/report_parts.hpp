@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,20 @@ void add_objectives(HtmlPage& page, const Json& result);                      //
 bool has_true_values(const Json& result);
 // Adds objective, infeasibility and parameters over iterations. parameters has the form of result.json, by the names of
 // columns. unit is that of the objective.
-void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters, const std::string& unit = "-");
-void add_multistart(HtmlPage& page, const Json& result);  // the waterfall, where there is one
+void add_convergence(HtmlPage& page, const Scene& scene, const Trajectory& history, const Json& parameters,
+                     const std::string& unit = "-");
+void add_multistart(HtmlPage& page, const Scene& scene, const Json& result);  // the waterfall, where there is one
+
+// The place of a value between the bounds of a parameter, from 0 to 1, by its logarithm if that is its scale.
+struct Between {
+  double lower = 0, upper = 1;
+  bool logarithmic = false;
+  double operator()(double value) const;
+};
+// None without two bounds. `name` may be "run1.k"; p is an entry of result["parameters"].
+std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p);
+inline constexpr const char* kBetween = "place between the bounds, on the scale of the parameter [-]";
+
 // A moving mechanism above its drawings at start and end.
 void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
                 const std::string& stills);

@@ -88,7 +88,7 @@ void print_profiles(std::ostream& out, const IdentificationResult& fit) {
 }
 
 // "the data determine 4 combinations of 4 parameters: singular values 1.8, 0.807, 0.335, 0.0239; the effects of c and T
-// cancel but for 0.024"
+// cancel but for 0.024". With continuity it is "7 of the 7 combinations that continuity leaves of 13 parameters".
 std::string determined_in_words(const IdentificationResult& fit) {
   constexpr Eigen::Index kMostValues = 6;  // singular values in a sentence
   constexpr double kCancelled = 0.1;       // effects of size 1 that cancel below this are reported
@@ -100,9 +100,12 @@ std::string determined_in_words(const IdentificationResult& fit) {
     if (all > kMostValues && k == kMostValues / 2) values += ", ...", k = all - kMostValues / 2;
     values += (values.empty() ? "" : ", ") + significant(s.singular_values(k), 3);
   }
-  const std::string words =
-      fmt::format("the data determine {} of {}: singular values {}", counted(s.rank, "combination"),
-                  counted(fit.parameters.size(), "parameter"), values);
+  const bool tied = all < static_cast<Eigen::Index>(fit.parameters.size());  // by equations between the parameters
+  const std::string combinations =
+      tied ? fmt::format("{} of the {} that continuity leaves", s.rank, counted(all, "combination"))
+           : counted(s.rank, "combination");
+  const std::string words = fmt::format("the data determine {} of {}: singular values {}", combinations,
+                                        counted(fit.parameters.size(), "parameter"), values);
   std::vector<std::string> parts;
   for (Eigen::Index k = 0; k < s.weakest.size(); ++k)
     if (std::abs(s.weakest(k)) > kPart) parts.push_back(fit.parameters[static_cast<std::size_t>(k)].name);
@@ -143,13 +146,16 @@ Json to_json(const ExperimentFit& e) {
             {"start_time", e.start_time},
             {"end_time", e.end_time},
             {"samples", e.samples},
-            {"rms", e.rms},
             {"channels", Json::object()}};
+  const bool one_unit =
+      std::ranges::all_of(e.channels, [&](const ChannelFit& c) { return c.unit == e.channels.front().unit; });
+  json["rms"] = one_unit ? Json(e.rms) : Json();  // no sum of rad^2 and rad^2/s^2
   if (e.window) json["window"] = {{"of", e.window->experiment}, {"number", e.window->number}};
   for (const ChannelFit& c : e.channels) {
     json["channels"][c.column] = {{"sensor", c.sensor},
                                   {"samples", c.samples},
                                   {"missing", c.missing},
+                                  {"unit", c.unit},
                                   {"rms", c.rms},
                                   {"rms_scaled", c.rms_scaled},
                                   {"sigma", c.sigma},
@@ -182,13 +188,13 @@ Json to_json(const ParameterProfile& p) {
 void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort) {
   TextTable parameters({"parameter", "initial", "value", "std error", "95 % interval", "unit", "at bound"});
   add_rows(parameters, fit.parameters);
-  TextTable channels({"experiment", "role", "channel", "samples", "rms", "sigma", "rms/sigma", "lag-1", "Ljung-Box p",
-                      "runs p", "residuals"});
+  TextTable channels({"experiment", "role", "channel", "samples", "rms", "sigma", "unit", "rms/sigma", "lag-1",
+                      "Ljung-Box p", "runs p", "residuals"});
   for (const ExperimentFit& e : fit.experiments) {
     add_rows(parameters, e.refitted);
     for (const ChannelFit& c : e.channels) {
       channels.add({e.name, e.validate ? "validate" : "fit", c.column, std::to_string(c.samples), significant(c.rms, 4),
-                    significant(c.sigma, 4) + (c.sigma_is_estimated ? " (estimated)" : ""),
+                    significant(c.sigma, 4) + (c.sigma_is_estimated ? " (estimated)" : ""), c.unit,
                     significant(c.rms_scaled, 4), fmt::format("{:.2f}", c.analysis.autocorrelation),
                     significant(c.analysis.ljung_box_p, 2), significant(c.analysis.runs_p, 2), c.analysis.in_words()});
     }

@@ -76,8 +76,9 @@ std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSp
       doubts.push_back(
           fmt::format("{}.channels[{}].column: the values of '{}' span {:.3g}, those of "
                       "the model {:.3g} {} at the start of the fit and {:.3g} {} at its end: is the column in degrees? "
-                      "Convert it to rad, or give the channel the gain 180/pi, with sigma and bias in degrees",
-                      place_of(spec, m.experiment), c, channel.column, span, start, unit, end, unit));
+                      "\"unit\": \"{}\" converts it, while numbers of sigma and bias stay in {}",
+                      place_of(spec, m.experiment), c, channel.column, span, start, unit, end, unit,
+                      unit == "rad" ? "deg" : "deg/s", unit));
     }
   }
   return doubts;

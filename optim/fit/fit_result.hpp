@@ -29,8 +29,9 @@ struct FittedParameter {
 
 struct ChannelFit {
   std::string column, sensor;
+  std::string unit;                      // of rms and sigma, where the program of the fit has set it
   std::size_t samples = 0, missing = 0;  // used, and empty cells among its rows
-  double rms = 0;                        // of measured - model, in the column's units
+  double rms = 0;                        // of measured - model
   double rms_scaled = 0;                 // of z
   double sigma = 1;
   bool sigma_is_estimated = false;                     // not yet where the fit was stopped before
@@ -51,7 +52,7 @@ struct ExperimentFit {
   bool validate = false;
   double start_time = 0, end_time = 0;  // of its simulation [s]
   std::size_t samples = 0;
-  double rms = 0;  // of measured - model over all its channels, in the columns' units
+  double rms = 0;  // of measured - model over all its channels: of one quantity only if these have one unit
   std::vector<ChannelFit> channels;
   std::optional<Influence> influence;         // fit: of several experiments, where there are standard errors
   std::vector<FittedParameter> refitted;      // validate: its free parameters

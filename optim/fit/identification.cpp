@@ -76,7 +76,7 @@ class Identification {
       throw std::invalid_argument(fmt::format("identification: {} cannot determine {}",
                                               counted(stack.samples(), "sample"),
                                               counted(stack.variables(), "parameter")));
-    const std::vector<Eigen::Index> profiled = profiled_unknowns(fit_, unknowns);
+    const std::vector<Eigen::Index> profiled = profiled_unknowns(fit_.options.profiles, names_of(unknowns, fit_.spec));
     FitSearch search(fit_, stack);
     const LeastSquaresResult solution = search.solved(scaling.to_x(start_of(unknowns)));
     fit_.result.status = fit_.abandoned ? SolverStatus::stopped : solution.status;

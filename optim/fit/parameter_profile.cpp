@@ -11,10 +11,10 @@
 
 namespace mbsopt {
 
-std::vector<Eigen::Index> profiled_unknowns(const FitContext& fit, const std::vector<UnknownParameter>& unknowns) {
-  const std::vector<std::string> names = names_of(unknowns, fit.spec);
+std::vector<Eigen::Index> profiled_unknowns(const std::vector<std::string>& profiles,
+                                            const std::vector<std::string>& names) {
   std::vector<Eigen::Index> indices;
-  for (const std::string& name : fit.options.profiles) {
+  for (const std::string& name : profiles) {
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
       throw std::invalid_argument(fmt::format("--profile: '{}' is not fitted{}; fitted are {}", name,

@@ -9,8 +9,9 @@
 
 namespace mbsopt {
 
-// Indices among the unknowns. Throws std::invalid_argument for a name that is not fitted.
-std::vector<Eigen::Index> profiled_unknowns(const FitContext& fit, const std::vector<UnknownParameter>& unknowns);
+// Indices of the profiled parameters among all fitted names. Throws std::invalid_argument for one that is not fitted.
+std::vector<Eigen::Index> profiled_unknowns(const std::vector<std::string>& profiles,
+                                            const std::vector<std::string>& names);
 
 // The profile of unknown k at the solution x.
 ParameterProfile profile_of(FitContext& fit, ExperimentStack& stack, Eigen::Index k, const Eigen::VectorXd& x);

@@ -24,8 +24,8 @@ bool has_override(const ExperimentSpec& spec, const std::string& name, double* v
 }  // namespace
 
 std::string place_of(const IdentificationSpec& spec, std::size_t experiment) {
-  const std::optional<WindowOrigin>& origin = spec.experiments[experiment].origin;
-  return origin ? origin->place : fmt::format("identification.experiments[{}]", experiment);
+  const std::string& place = spec.experiments[experiment].place;
+  return place.empty() ? fmt::format("identification.experiments[{}]", experiment) : place;
 }
 
 bool is_held(const Parameter& p) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "core/linear/dense.hpp"
@@ -46,10 +47,18 @@ LeastSquaresResult refitted(const FitContext& fit, ExperimentStack& stack,
   return found;
 }
 
-// The refit of its own parameters f compensates errors of the shared parameters s as far as it can:
-//   j = j_s - J_f (J_f^+ J_s),   variance = j cov(s) j' + j_f cov(f) j_f'
-void predict_validation(FitContext& fit, std::size_t e, const ExperimentStack& stack, const LeastSquaresResult& found,
-                        const FitStatistics& own, std::size_t first) {
+// dz/drho of an experiment that validates, in its own parameters f and in the shared ones s. The refit compensates
+// errors of s as far as it can:
+//   f_s = -J_f^+ J_s,   j = j_s + j_f f_s
+struct Sensitivities {
+  Eigen::MatrixXd J_f, J, f_s;  // J: of s, with the refit
+  Eigen::MatrixXd of_shared;    // the covariance of s
+};
+
+// There are none if the fit has no standard errors, or if the simulation fails.
+std::optional<Sensitivities> sensitivities(FitContext& fit, std::size_t e, const ExperimentStack& stack,
+                                           const LeastSquaresResult& found) {
+  if (!fit.result.statistics.none.empty()) return std::nullopt;
   const std::vector<UnknownParameter> fitted = unknowns_of_fit(fit.scene, fit.spec);
   std::vector<UnknownParameter> all = free_in(fit.scene, fit.spec, e);
   const Eigen::Index F = static_cast<Eigen::Index>(all.size()), N = stack.samples();
@@ -65,16 +74,36 @@ void predict_validation(FitContext& fit, std::size_t e, const ExperimentStack& s
     rho(F + static_cast<Eigen::Index>(i)) = fit.shared(all[static_cast<std::size_t>(F) + i].parameter);
   const LeastSquaresPoint point = simulated(whole, scaling.to_x(rho));
   fit.result.simulations += whole.simulations();
-  if (!point.ok || !fit.result.statistics.none.empty() || !own.none.empty()) return;
-  Eigen::MatrixXd J = z_in_parameters(whole, point, rho);
-  if (F > 0) {
-    const Eigen::MatrixXd J_f = J.leftCols(F), J_s = J.rightCols(J.cols() - F);
-    J.rightCols(J.cols() - F) -= J_f * OrthogonalDecomposition(J_f).solve(J_s);
+  if (!point.ok) return std::nullopt;
+  const Eigen::MatrixXd J = z_in_parameters(whole, point, rho).topRows(N);
+  Sensitivities s{J.leftCols(F), J.rightCols(J.cols() - F), {}, fit.result.statistics.covariance(shared, shared)};
+  if (F == 0) return s;
+  s.f_s = -OrthogonalDecomposition(s.J_f).solve(s.J);
+  s.J += s.J_f * s.f_s;
+  return s;
+}
+
+// cov(f) = own + f_s cov(s) f_s': the refit takes s as exact, which they are not.
+void add_shared_errors(FitStatistics& own, const Eigen::VectorXd& values, const Sensitivities& s, double quantile) {
+  const Eigen::MatrixXd added = s.f_s * s.of_shared * s.f_s.transpose();
+  own.quantile = std::max(own.quantile, quantile);
+  for (Eigen::Index k = 0; k < values.size(); ++k) {
+    own.std_error(k) = std::hypot(own.std_error(k), std::sqrt(added(k, k)));
+    const double half = own.quantile * own.std_error(k);
+    own.ci95.row(k) << values(k) - half, values(k) + half;
   }
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(J.cols(), J.cols());
+}
+
+// variance = j cov(s) j' + j_f own j_f'
+void predict_validation(FitContext& fit, const ExperimentStack& stack, const Sensitivities& s, const FitStatistics& own,
+                        std::size_t first) {
+  const Eigen::Index F = s.J_f.cols(), S = s.J.cols();
+  Eigen::MatrixXd J(s.J.rows(), F + S);
+  J << s.J_f, s.J;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(F + S, F + S);
   if (F > 0) covariance.topLeftCorner(F, F) = own.covariance;
-  covariance.bottomRightCorner(J.cols() - F, J.cols() - F) = fit.result.statistics.covariance(shared, shared);
-  predict(fit, stack, J.topRows(N), covariance, first);
+  covariance.bottomRightCorner(S, S) = s.of_shared;
+  predict(fit, stack, J, covariance, first);
 }
 
 // Warns if the fit has learnt something wrong. A right model that starts at the true values raises the squares of what
@@ -117,10 +146,17 @@ void validate(FitContext& fit, std::size_t e) {
   if (found.point.z.size() > 0) {
     const std::size_t first = fit.result.residuals.size();
     score_all(fit, stack, found.point.z, false);
+    const Eigen::VectorXd values = scaling.to_rho(found.x);
     FitStatistics own;
     if (!unknowns.empty()) own = statistics_at(fit, found, stack, unknowns);
-    scored.refitted = described(fit, unknowns, scaling.to_rho(found.x), own);
-    predict_validation(fit, e, stack, found, own, first);
+    const std::optional<Sensitivities> of_samples = sensitivities(fit, e, stack, found);
+    if (of_samples && own.none.empty()) {
+      if (!unknowns.empty()) add_shared_errors(own, values, *of_samples, fit.result.statistics.quantile);
+      predict_validation(fit, stack, *of_samples, own, first);
+    } else if (!unknowns.empty()) {
+      withhold_errors(own, "those of the shared parameters are not known");
+    }
+    scored.refitted = described(fit, unknowns, values, own);
     compare_with_start(fit, e, unknowns, scaling, found.point.z.head(stack.samples()).squaredNorm());
   } else if (!unknowns.empty()) {
     scored.refitted = described(fit, unknowns, scaling.to_rho(found.x), FitStatistics());

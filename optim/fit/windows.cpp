@@ -113,13 +113,17 @@ class Cut {
     if (windows > static_cast<double>(t_.size()))
       throw std::invalid_argument(
           fmt::format("{}.length: is {} s, which makes {} windows of {} rows", place, length, windows, t_.size()));
+    if (length > end - start)
+      cut.warnings.push_back(
+          fmt::format("{}.length: is {:g} s, but the record has only {:.6g} s: it is one window, as without windows",
+                      place, length, end - start));
     ExperimentSpec window = without_windows();
     for (std::size_t k = 0; k < static_cast<std::size_t>(windows); ++k) {
       const bool last = static_cast<double>(k + 1) == windows;
       const double from = start + static_cast<double>(k) * length;
       window.start_time = from, window.end_time = last ? end : start + static_cast<double>(k + 1) * length;
       window.name = fmt::format("{}.{}", whole_.name, k + 1);
-      window.origin = {whole_.name, place_, k + 1, whole_.windows->continuity && !last};
+      window.origin = {whole_.name, k + 1, whole_.windows->continuity && !last};
       CsvTable rows = rows_between(data_, t_, from, *window.end_time, last);
       guess_start(window, rows, cut.warnings);
       cut.problem.identification->experiments.push_back(window);
@@ -130,7 +134,7 @@ class Cut {
  private:
   ExperimentSpec without_windows() const {
     ExperimentSpec spec = whole_;
-    spec.windows.reset();
+    spec.windows.reset(), spec.place = place_;
     return spec;
   }
 
@@ -266,6 +270,7 @@ CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>&
       Cut(problem.scene, spec.experiments[e], place_of(spec, e), data[e], user_forces, go_on).add_to(cut);
     } else {
       cut.problem.identification->experiments.push_back(spec.experiments[e]);
+      cut.problem.identification->experiments.back().place = place_of(spec, e);
       cut.data.push_back(data[e]);
     }
   }

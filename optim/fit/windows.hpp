@@ -25,7 +25,7 @@ struct UserForce;
 struct CutProblem {
   Problem problem;
   std::vector<CsvTable> data;         // one per experiment
-  std::vector<std::string> warnings;  // of starts that could not be guessed
+  std::vector<std::string> warnings;  // of lengths beyond the record, and of starts that could not be guessed
 };
 
 // A problem without windows remains as it is. go_on: within a simulation; false leaves the other starts as they are

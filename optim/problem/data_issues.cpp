@@ -37,7 +37,8 @@ class DataCheck {
     if (issues_.empty()) attempt(place_ + ".data", [&] { ascending_times(data_, experiment_.time); });
     if (issues_.empty()) check_samples();
     if (std::ranges::all_of(issues_, &SceneIssue::is_warning))
-      for (std::size_t c = 0; c < experiment_.channels.size(); ++c) check_values(c);
+      for (std::size_t c = 0; c < experiment_.channels.size(); ++c)
+        check_other_unit(c), check_numbers(c), check_values(c);
     return std::move(issues_);
   }
 
@@ -70,6 +71,45 @@ class DataCheck {
     issues_.push_back({channel_path(c, "column"),
                        fmt::format("'{}' is in {}, the sensor '{}' in {}", channel.column, to_string(unit->dimension),
                                    channel.sensor, to_string(row->dimension))});
+  }
+
+  // The header says one unit, the problem another one of the same dimension.
+  void check_other_unit(std::size_t c) {
+    const ChannelSpec& channel = experiment_.channels[c];
+    if (channel.unit.empty() || !data_.has_column(channel.column)) return;
+    const std::string_view header = parts_of_header(data_.header[data_.find_column(channel.column)]).unit.value_or("");
+    const std::optional<Unit> said = parse_column_unit(header), counts = parse_column_unit(channel.unit);
+    if (!said || !counts || !compatible(said->dimension, counts->dimension) || said->to_si == counts->to_si) return;
+    issues_.push_back({channel_path(c, "unit"),
+                       fmt::format("the header of '{}' says {}, \"unit\" says {}, which counts", channel.column, header,
+                                   channel.unit),
+                       true});
+  }
+
+  // Numbers are in SI, as the values of the column are once they are read. Beside a column in another unit, a number
+  // may be meant in that one.
+  void check_numbers(std::size_t c) {
+    const ChannelSpec& channel = experiment_.channels[c];
+    const std::string text = stated_unit(channel, data_);
+    const std::optional<Unit> unit = parse_column_unit(text);
+    if (text.empty() || !unit || unit->to_si == 1 || unit->dimension.is_none()) return;
+    const std::string si = to_string(unit->dimension);
+    const std::optional<Unit> of_fields = parse_unit(text);  // there g is the gram
+    const bool same = of_fields && of_fields->to_si == unit->to_si && compatible(of_fields->dimension, unit->dimension);
+    const auto check = [&](const char* key, const Field& field, double when_absent) {
+      const bool has_unit = field.text().find('[') != std::string::npos;
+      if (!field.is_number() || has_unit || field.number() == when_absent) return;
+      const double x = field.number();
+      issues_.push_back(
+          {channel_path(c, key),
+           fmt::format("is {0:g} {1}, which is {2:.3g} {3}: write \"{4}\" if {0:g} {3} is meant, else "
+                       "\"{0:g} [{1}]\"",
+                       x, si, x / unit->to_si, text,
+                       same ? fmt::format("{:g} [{}]", x, text) : fmt::format("{:g} [{}]", x * unit->to_si, si)),
+           true});
+    };
+    check("sigma", channel.sigma, ChannelSpec().sigma.number());
+    check("bias", channel.bias, 0);
   }
 
   template <class F>

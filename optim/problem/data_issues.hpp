@@ -1,5 +1,6 @@
 // Checks the data of an experiment: its columns exist, each is compared once, its times ascend, and every channel has
-// measurements. Findings name the field of the problem that uses the data. It warns of angles that jump by a turn.
+// measurements. Findings name the field of the problem that uses the data. It warns of
+// angles that jump by a turn, and of units that may be mistaken.
 #pragma once
 
 #include <string>

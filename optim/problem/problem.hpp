@@ -167,9 +167,9 @@ struct WindowsSpec {
 
 // The experiment and window of the problem file that an experiment is made from.
 struct WindowOrigin {
-  std::string experiment, place;  // its name and its path
-  std::size_t number = 1;         // from 1
-  bool continues = false;         // into the next experiment: its end is the start of that
+  std::string experiment;  // its name
+  std::size_t number = 1;  // from 1
+  bool continues = false;  // into the next experiment: its end is the start of that
 };
 
 struct ExperimentSpec {
@@ -186,6 +186,7 @@ struct ExperimentSpec {
   std::vector<std::string> free;                          // parameters with a value of their own here
   std::optional<WindowsSpec> windows = {};                // its windows
   std::optional<WindowOrigin> origin = {};                // set if it is a window
+  std::string place = {};                                 // path in the problem file; empty: by its number
   bool validate = false;                                  // role: scored (only "free" refitted), not fitted
 };
 

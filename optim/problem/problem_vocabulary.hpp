@@ -159,9 +159,10 @@ void describe(auto& v, Like<ChannelSpec> auto& c) {
   v.reference("sensor", c.sensor, To::sensor, {"what it measured", Need::required});
   v.text("unit", c.unit, {"of the column, instead of the unit in the header; without either it is SI"});
   v.plain("unwrap", c.unwrap, kAny, {"true: the column jumps by whole turns, which are taken out"});
-  v.number("sigma", c.sigma, {"standard deviation of the noise, in the column's unit"});
+  v.number("sigma", c.sigma, {"standard deviation of the noise; a number is in SI, also where the column is not"});
   v.number("gain", c.gain, {"measured = gain * sensor + bias + noise"});
-  v.expression("bias", c.bias, Names::time_law, {"in the unit of the column's values; also of t and signals"});
+  v.expression("bias", c.bias, Names::time_law,
+               {"a number is in SI, also where the column is not; also of t and signals"});
   v.expression("delay", c.delay, Names::time_law,
                {"measured(t) = gain * sensor(t - delay) + bias + noise [s]", Need::optional, dimension::kTime});
   v.choice("estimate_sigma", c.estimate_sigma, kSigmaEstimates,

@@ -160,8 +160,8 @@ class Search {
   void iterate() {
     double lambda = kFirstDamping;
     int invalid = 0;
-    if (!told(0, 0)) return;
     LinearModel model(problem_, point_);
+    if (!told(free_gradient(model), 0)) return;
     first_size_ = model.size;
     if (options_.large_residuals) equalise(model.units);
     VectorXd d = step(model, lambda);

@@ -252,6 +252,33 @@ TEST_CASE("identify: what GNU timeout ends keeps the best values so far", "[comm
   CHECK(json_of(out / "result.json").at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-6));
 }
 
+TEST_CASE("identify --profile: an unknown name is found before the fit", "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  const CommandOutcome outcome = run_command({"identify", file, "--out", folder.file("out"), "--profile", "zz"});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("--profile: 'zz' is not fitted") && !Contains("iteration"));
+  CHECK_FALSE(std::filesystem::exists(folder.path / "out" / kJournalFile));
+}
+
+TEST_CASE("identify: the first row of the history holds the gradient of the start", "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  REQUIRE(run_command({"identify", file, "--out", folder.file("out")}).exit_code == kDone);
+  std::istringstream rows(content_of(folder.path / "out/history.csv"));
+  std::string row;
+  std::getline(rows, row);
+  CHECK(row == "iteration,cost,gradient_norm,step_norm,k");
+  std::getline(rows, row);
+  double iteration = 1, cost = 0, gradient = 0;
+  char comma = 0;
+  std::istringstream(row) >> iteration >> comma >> cost >> comma >> gradient;
+  CHECK(iteration == 0);
+  CHECK(gradient > 0.01 * cost);
+}
+
 TEST_CASE("identify --compare: the other file is checked before the fit, and found again by resume", "[command]") {
   const TemporaryFolder folder;
   folder.write("swing.csv", measured_swing(folder));

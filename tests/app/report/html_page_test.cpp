@@ -72,6 +72,12 @@ TEST_CASE("headers of many columns may break, so that print does not cut them", 
   CHECK_THAT(many.text(), Contains("<table class=\"wide\">"));
 }
 
+TEST_CASE("short names stand upright above narrow columns", "[report]") {
+  HtmlPage page("p");
+  page.table({"", "J", "run1.theta0"}, {{"J", "", ""}}, true);
+  CHECK_THAT(page.text(), Contains("<th class=\"upright\">J</th><th>run1.theta0</th>"));
+}
+
 TEST_CASE("parts of a page that selectors choose hold their keys and their place for links", "[report]") {
   HtmlPage page("p");
   page.begin_choices({"objective", "parameter"});

@@ -134,6 +134,28 @@ TEST_CASE("several experiments share parameters, own others, and override", "[id
   CHECK(result.samples == 2 * 201);
 }
 
+TEST_CASE("standard errors of what validates hold those of the shared parameters", "[identification]") {
+  const CsvTable clean = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2, 20),
+                 other = pendulum::exact_motion(64, 0.055, 2.1, 0, 2, 20);
+  Problem p = fit_problem(64, 0.055, 1.53, 1.55);
+  p.identification->experiments.push_back(pendulum::experiment("other", {"theta0", "omega0"}));
+  p.identification->experiments[1].validate = true;
+  p.identification->experiments[1].overrides = {{"theta0", 2.1}, {"omega0", 0}};
+  constexpr int kRuns = 30;
+  double squares = 0, claimed = 0;
+  for (unsigned seed = 0; seed < kRuns; ++seed) {  // the other record has a tenth of the noise
+    std::vector<CsvTable> data{clean, other};
+    pendulum::add_noise(data[0], 0.02, seed + 1), pendulum::add_noise(data[1], 0.002, seed + 1001);
+    const IdentificationResult result = run_identification(p, data);
+    REQUIRE(result.ok());
+    const FittedParameter& omega0 = result.experiments[1].refitted.at(1);
+    squares += omega0.value * omega0.value / kRuns, claimed += omega0.std_error / kRuns;
+    CHECK(omega0.ci95[1] - omega0.value == Approx(omega0.value - omega0.ci95[0]));
+    CHECK(omega0.ci95[1] > omega0.value + 1.9 * omega0.std_error);
+  }
+  CHECK(std::sqrt(squares) / claimed == Approx(1).margin(0.4));  // 3 standard deviations of the scatter of 30
+}
+
 TEST_CASE("what validates is compared with the start, and predicted with its measurements", "[identification]") {
   Problem p = fit_problem(60, 0.1, 1.5, 1.5);
   p.identification->experiments.push_back(pendulum::experiment("other", {"theta0", "omega0"}));

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "optim/fit/identification.hpp"
+#include "optim/fit/unknown_parameters.hpp"
 #include "tests/optim/fit/windowed_pendulum.hpp"
 
 using namespace mbsopt;
@@ -17,7 +18,8 @@ TEST_CASE("windows take every sample once, and the last takes what is left", "[i
     const CutProblem cut = cut_into_windows(windowed(length), {data});
     const std::vector<ExperimentSpec>& specs = cut.problem.identification->experiments;
     REQUIRE(specs.size() == windows);
-    CHECK(cut.warnings.empty());
+    REQUIRE(cut.warnings.size() == (length > 4 ? 1 : 0));
+    if (length > 4) CHECK_THAT(cut.warnings[0], Contains("windows.length: is 9 s, but the record has only 4 s"));
     std::vector<double> t;
     for (std::size_t w = 0; w < specs.size(); ++w) {
       CHECK(specs[w].name == "swing." + std::to_string(w + 1));
@@ -28,6 +30,18 @@ TEST_CASE("windows take every sample once, and the last takes what is left", "[i
     CHECK(*specs.back().end_time == 4);
     CHECK(t == data.columns[0]);
   }
+}
+
+TEST_CASE("an experiment after one with windows keeps its place in the problem file", "[identification][windows]") {
+  Problem p = windowed();
+  p.identification->experiments.push_back(p.identification->experiments[0]);
+  p.identification->experiments[1].name = "second", p.identification->experiments[1].windows.reset();
+  const CsvTable data = motion(p, 0);
+  const CutProblem cut = cut_into_windows(p, {data, data});
+  const IdentificationSpec& spec = *cut.problem.identification;
+  REQUIRE(spec.experiments.size() == 5);
+  CHECK(place_of(spec, 3) == "identification.experiments[0]");
+  CHECK(place_of(spec, 4) == "identification.experiments[1]");
 }
 
 TEST_CASE("starts of windows are guessed from the samples, with wrong parameters too", "[identification][windows]") {

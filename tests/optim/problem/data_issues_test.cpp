@@ -55,6 +55,45 @@ TEST_CASE("a channel without any sample is an issue of its column", "[data]") {
   CHECK_THAT(issues[0].message, Catch::Contains("'y' of run.csv has no sample after the start at 0 s"));
 }
 
+TEST_CASE("a number as sigma or bias of a column that is not in SI is doubted", "[data]") {
+  const std::string csv = "t,x [deg],y [rad]\n0,1,2\n1,3,2.5\n2,2,2.6\n";
+  ExperimentSpec e = experiment();
+  e.channels[0].sigma = e.channels[1].sigma = 0.25, e.channels[0].bias = 0.1;
+  const auto issues = issues_of(e, csv);
+  REQUIRE(issues.size() == 2);
+  CHECK((issues[0].is_warning && issues[1].is_warning));
+  CHECK(issues[0].path == "experiments[0].channels[0].sigma");
+  CHECK(issues[0].message ==
+        "is 0.25 rad, which is 14.3 deg: write \"0.25 [deg]\" if 0.25 deg is meant, else \"0.25 [rad]\"");
+  CHECK(issues[1].path == "experiments[0].channels[0].bias");
+  e.channels[0].sigma = Expression::parse("0.25 [deg]"), e.channels[0].bias = 0.0;
+  CHECK(issues_of(e, csv).empty());
+}
+
+TEST_CASE("a doubt about an acceleration in g suggests m/s^2, since fields read g as the gram", "[data]") {
+  Scene scene;
+  scene.sensors.emplace_back();
+  scene.sensors[0].name = "a", scene.sensors[0].quantity = "acceleration";
+  ExperimentSpec e;
+  e.channels = {{"a", "a"}};
+  e.channels[0].sigma = 0.01;
+  const auto issues = find_data_issues(e, "experiments[0]", parse_csv("t,a [g]\n0,1\n1,2\n", "run.csv"), scene);
+  REQUIRE(issues.size() == 1);
+  CHECK_THAT(issues[0].message, Catch::Contains("0.00102 g: write \"0.0980665 [m/s^2]\" if 0.01 g is meant"));
+}
+
+TEST_CASE("a unit other than that of the header is said", "[data]") {
+  const std::string csv = "t,x [deg],y\n0,1,2\n1,3,2.5\n2,2,2.6\n";
+  ExperimentSpec e = experiment();
+  e.channels[0].unit = "rad", e.channels[1].unit = "rad";
+  const auto issues = issues_of(e, csv);
+  REQUIRE(issues.size() == 1);
+  CHECK((issues[0].is_warning && issues[0].path == "experiments[0].channels[0].unit"));
+  CHECK(issues[0].message == "the header of 'x' says deg, \"unit\" says rad, which counts");
+  e.channels[0].unit = "deg";
+  CHECK(issues_of(e, csv).empty());
+}
+
 TEST_CASE("a column is compared once, and not with the times", "[data]") {
   ExperimentSpec e = experiment();
   e.channels[1].column = "x";
