@@ -110,6 +110,7 @@ void judge_stationarity(const DesignSpec& spec, DesignResult& result) {
 
 // Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
 void judge_true_extremes(const DesignProgram& program, const CaseEvaluator& evaluator, DesignResult& result) {
+  if (result.status == SolverStatus::infeasible) return;  // the conflicts name what is missed
   bool beyond = false;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     const DesignConstraint& c = result.constraints[i];

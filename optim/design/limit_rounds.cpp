@@ -79,8 +79,10 @@ bool is_an_end(SolverStatus status) {
 
 bool is_an_improvement(const DesignProgram& program, const NlpResult& found, const NlpResult& before) {
   if (found.status == SolverStatus::converged) return true;
-  return found.point.ok && is_better(found.point.f, program.violation(found.point.c), before.point.f,
-                                     program.violation(before.point.c), kConstraintTolerance);
+  const auto violations = [&](const NlpResult& r) {
+    return program.sum_of_violations(r.point.c, kConstraintTolerance);
+  };
+  return found.point.ok && is_better(found.point.f, violations(found), before.point.f, violations(before));
 }
 
 // The hooks of a later round, whose iterations follow those of the rounds before.

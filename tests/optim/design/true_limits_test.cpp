@@ -113,3 +113,4 @@ TEST_CASE("a bound of a variable is named where it keeps a limit from holding", 
   // The smooth maximum grows with a, and so do 3 times the relative violation.
   CHECK(result.conflicts[1].price == Approx(result.final_evaluation.psi_rho(1, 0) / 3).epsilon(1e-12));
 }
+  CHECK(result.warnings.empty());  // more sharpness would not help
