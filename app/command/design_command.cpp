@@ -240,6 +240,7 @@ int design_command(const CommandContext& context) {
   }
   run.result["model"] = to_json(before.model);
   print_model(context.out, scene.name, before.model);
+  for (const std::string& warning : before.warnings) run.warn(warning);
 
   LongRun long_run(run);
   const auto [design, cut_off] = minimised(run, long_run, before.psi);

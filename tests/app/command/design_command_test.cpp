@@ -114,6 +114,19 @@ TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     ::kill(::getpid(), SIGTERM);
   });
+TEST_CASE("design says of the start what simulate says of it", "[command]") {
+  const TemporaryFolder folder;
+  std::vector<std::string> more = kBounds;
+  more.insert(more.end(), {"--set", "joints[0].point2=[0.3, 0, 0]"});
+  const std::string file = folder.write("rod.json", kPendulum);
+  std::vector<std::string> simulate{"simulate", file, "--out", folder.file("run")};
+  simulate.insert(simulate.end(), more.begin(), more.end());
+  const auto apart = Contains("leaves the points of joint 'pin' 0.3 m apart");
+  CHECK_THAT(run_command(simulate).err, apart);
+  CHECK_THAT(run_design_command(file, folder.file("out"), more).err, apart);
+  CHECK_THAT(json_of(folder.path / "out/result.json").at("warnings").dump(), apart);
+}
+
   std::vector<std::string> more = kBounds;  // simulations that take seconds, so that the signal comes within one
   more.insert(more.end(), {"--set", "simulation.integrator.rtol=1e-13", "--set", "simulation.integrator.atol=1e-15",
                            "--set", "simulation.integrator.max_step=1e-5", "--set", "simulation.output_step=0.1"});
