@@ -26,7 +26,7 @@ Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : 
 
 void print_design(std::ostream& out, const DesignResult& design, const ObjectiveUnits& units,
                   const std::string& effort) {
-  TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
+  TextTable parameters({"parameter", "initial", end_of_search(to_string(design.status)), "unit", "at bound"});
   for (const DesignVariable& v : design.variables) {
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
                     bound_hit(v.at_lower, v.at_upper)});

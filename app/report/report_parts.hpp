@@ -3,6 +3,7 @@
 
 #include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "app/files/result_json.hpp"
@@ -27,6 +28,12 @@ bool has_true_values(const Json& result);
 // columns. unit is that of the objective.
 void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters, const std::string& unit = "-");
 void add_multistart(HtmlPage& page, const Json& result);  // the waterfall, where there is one
+// "all 10 starts" or "3 of 10 starts" of the entry "multistart".
+std::string counted_starts(const Json& multistart);
+// "all 10 starts, seed 7: 2 at the best optimum", "... : the best one has not converged (iteration_limit)".
+std::string starts_in_words(const Json& multistart);
+// "optimum" if the optimiser converged, else "best point": the end of its search. status: as in result.json.
+const char* end_of_search(std::string_view status);
 // A moving mechanism above its drawings at start and end.
 void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
                 const std::string& stills);
