@@ -260,7 +260,7 @@ int design_command(const CommandContext& context) {
   if (cut_off || design.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best design so far");
   } else if (!design.ok()) {
-    run.failed(design.message);
+    long_run.failed(design.status, design.message);
   }
   for (std::size_t i = 0; i < after.instants.size(); ++i) {
     const std::string& name = run.problem.objectives[i].name;

@@ -98,7 +98,14 @@ TEST_CASE("design: too few iterations is a failure in words that keeps the best 
   more.insert(more.end(), {"--set", "design.optimizer.max_iterations=1"});
   const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), more);
   CHECK(outcome.exit_code == kNumericalFailure);
-  CHECK_THAT(outcome.err, Contains("design failed: "));
+  const std::string advice =
+      "raise design.optimizer.max_iterations or max_evaluations, or go on from the best point: "
+      "'mbsopt design " +
+      folder.file("out/optimized.json");
+  CHECK_THAT(outcome.err, Contains("design failed: stopped at the limit of 1 iteration; ") && Contains(advice));
+  CHECK_THAT(outcome.out, Contains("best point") && !Contains("optimum"));
+  const CommandOutcome resumed = run_command({"resume", folder.file("out")});
+  CHECK_THAT(resumed.out, Contains("there is nothing to go on with: ") && Contains(advice));
   const auto result = json_of(folder.path / "out/result.json");
   CHECK(result.at("status") == "failed");
   CHECK(result.at("optimizer").at("objective_final") <= result.at("optimizer").at("objective_initial"));
@@ -107,13 +114,6 @@ TEST_CASE("design: too few iterations is a failure in words that keeps the best 
              Contains("class=\"banner\"") && Contains("This run failed: stopped at the limit of 1 iteration"));
 }
 
-TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
-  const TemporaryFolder folder;
-  std::thread killer([] {
-    wait_for_handler(SIGTERM);
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
-    ::kill(::getpid(), SIGTERM);
-  });
 TEST_CASE("design says of the start what simulate says of it", "[command]") {
   const TemporaryFolder folder;
   std::vector<std::string> more = kBounds;
@@ -127,6 +127,13 @@ TEST_CASE("design says of the start what simulate says of it", "[command]") {
   CHECK_THAT(json_of(folder.path / "out/result.json").at("warnings").dump(), apart);
 }
 
+TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
+  const TemporaryFolder folder;
+  std::thread killer([] {
+    wait_for_handler(SIGTERM);
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    ::kill(::getpid(), SIGTERM);
+  });
   std::vector<std::string> more = kBounds;  // simulations that take seconds, so that the signal comes within one
   more.insert(more.end(), {"--set", "simulation.integrator.rtol=1e-13", "--set", "simulation.integrator.atol=1e-15",
                            "--set", "simulation.integrator.max_step=1e-5", "--set", "simulation.output_step=0.1"});
