@@ -26,7 +26,7 @@ Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : 
 
 void print_design(std::ostream& out, const DesignResult& design, const ObjectiveUnits& units,
                   const std::string& effort) {
-  TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
+  TextTable parameters({"parameter", "initial", end_of_search(to_string(design.status)), "unit", "at bound"});
   for (const DesignVariable& v : design.variables) {
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
                     bound_hit(v.at_lower, v.at_upper)});
@@ -240,6 +240,7 @@ int design_command(const CommandContext& context) {
   }
   run.result["model"] = to_json(before.model);
   print_model(context.out, scene.name, before.model);
+  for (const std::string& warning : before.warnings) run.warn(warning);
 
   LongRun long_run(run);
   const auto [design, cut_off] = minimised(run, long_run, before.psi);
@@ -259,7 +260,7 @@ int design_command(const CommandContext& context) {
   if (cut_off || design.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best design so far");
   } else if (!design.ok()) {
-    run.failed(design.message);
+    long_run.failed(design.status, design.message);
   }
   for (std::size_t i = 0; i < after.instants.size(); ++i) {
     const std::string& name = run.problem.objectives[i].name;

@@ -425,7 +425,7 @@ int identify_command(const CommandContext& context) {
   if (fit.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best fit so far");
   } else if (!fit.ok()) {
-    run.failed(fit.message);
+    long_run.failed(fit.status, fit.message);
     if (other) run.warn("--compare: is skipped, since the fit did not converge");
   }
   run.write("report.html", report_of(run, cut, before, start, motion, fit, history));

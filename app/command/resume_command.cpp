@@ -5,6 +5,7 @@
 
 #include "app/command/command_line.hpp"
 #include "app/files/journal.hpp"
+#include "app/files/json_text.hpp"
 #include "app/json/source_text.hpp"
 #include "app/run/command.hpp"
 #include "app/terminal/exit_code.hpp"
@@ -14,9 +15,11 @@ namespace {
 
 int nothing_left(const CommandContext& context, const std::string& command, const std::string& ended) {
   const std::filesystem::path folder = context.options.problem_file;
-  context.out << fmt::format("{}: its '{}' came to its end ({}); there is nothing to go on with\n", folder.string(),
-                             command, ended);
-  if (context.json) *context.json << read_text_file(folder / "result.json");
+  const std::string result = read_text_file(folder / "result.json");
+  const std::string message = read_json(result).value("message", "");  // of a failed run, with what to change
+  context.out << fmt::format("{}: its '{}' came to its end ({}); there is nothing to go on with{}\n", folder.string(),
+                             command, ended, message.empty() ? "" : ": " + message);
+  if (context.json) *context.json << result;
   return kDone;
 }
 

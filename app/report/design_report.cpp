@@ -42,7 +42,8 @@ void add_design_verdict(HtmlPage& page, const Json& result) {
 
 void add_parameters(HtmlPage& page, const Scene& scene, const Json& result) {
   std::vector<TableRow> rows;
-  RowPlot plot{.title = "Variables between their bounds (ring: start, dot: optimum)",
+  const char* const end = end_of_search(result.at("optimizer").at("status").get<std::string>());
+  RowPlot plot{.title = fmt::format("Variables between their bounds (ring: start, dot: {})", end),
                .x_label = kBetween,
                .range = std::pair(-0.03, 1.03),
                .track = true};
@@ -60,7 +61,7 @@ void add_parameters(HtmlPage& page, const Scene& scene, const Json& result) {
                          .dot = to,
                          .words = cell(p.at("initial"), 4) + " \u2192 " + cell(p.at("value"), 4) + after_number(p)});
   }
-  page.table({"parameter", "initial", "optimum", "unit", "lower", "upper", "at bound"}, rows);
+  page.table({"parameter", "initial", end, "unit", "lower", "upper", "at bound"}, rows);
   page.drawing(to_svg(plot));
 }
 

@@ -221,8 +221,8 @@ LinePlot parallel_coordinates(const Scene& scene, const Json& multistart, const 
   for (const Json& record : multistart.at("waterfall")) {
     if (plot.series.size() == kMost || !record.contains("parameters") || !record.value("objective", Json()).is_number())
       continue;
-    const bool is_best = plot.series.size() < best;
-    PlotSeries series{is_best ? "the best optimum" : "other ends", {}, {}, Mark::line};
+    const bool is_best = plot.series.size() < std::max<std::size_t>(best, 1);
+    PlotSeries series{is_best ? (best > 0 ? "the best optimum" : "the best end") : "other ends", {}, {}, Mark::line};
     if (is_best && !plot.series.empty()) series.part_of = 0;
     if (!is_best && first_other) series.part_of = first_other;
     if (!is_best && !first_other) first_other = plot.series.size();
@@ -242,13 +242,30 @@ std::string minimised_unit(const Json& result) {
   return objectives.empty() ? "-" : unit_of(*objectives.begin());
 }
 
+const char* end_of_search(std::string_view status) {
+  return status.starts_with("converged") ? "optimum" : "best point";
+}
+
+std::string counted_starts(const Json& multistart) {
+  const long finished = multistart.at("finished").get<long>(), starts = multistart.at("starts").get<long>();
+  return finished < starts ? fmt::format("{} of {}", finished, counted(starts, "start"))
+                           : "all " + counted(starts, "start");
+}
+
+std::string starts_in_words(const Json& multistart) {
+  const long same = multistart.at("at_the_best_optimum").get<long>();
+  const std::string starts = fmt::format("{}, seed {}", counted_starts(multistart), multistart.at("seed").get<long>());
+  if (same > 0) return fmt::format("{}: {} at the best optimum", starts, same);
+  if (multistart.at("best").is_null()) return starts + ": none could be evaluated";
+  return fmt::format("{}: the best one has not converged to an optimum ({})", starts,
+                     multistart.at("waterfall").at(0).at("status").get<std::string>());
+}
+
 void add_multistart(HtmlPage& page, const Scene& scene, const Json& result) {
   if (!result.contains("multistart") || !result.at("multistart").contains("waterfall")) return;
   const Json& multistart = result.at("multistart");
   page.heading("Starts");
-  page.paragraph(fmt::format("{}, seed {}; {} at the best optimum.",
-                             counted(multistart.at("finished").get<long>(), "start"), multistart.at("seed").get<long>(),
-                             multistart.at("at_the_best_optimum").get<long>()));
+  page.paragraph(starts_in_words(multistart) + ".");
   LinePlot plot{.title = "Waterfall",
                 .x_label = "rank",
                 .y_label = fmt::format("objective [{}]", minimised_unit(result)),

@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "app/files/result_json.hpp"
@@ -29,6 +30,12 @@ bool has_true_values(const Json& result);
 void add_convergence(HtmlPage& page, const Scene& scene, const Trajectory& history, const Json& parameters,
                      const std::string& unit = "-");
 void add_multistart(HtmlPage& page, const Scene& scene, const Json& result);  // the waterfall, where there is one
+// "all 10 starts" or "3 of 10 starts" of the entry "multistart".
+std::string counted_starts(const Json& multistart);
+// "all 10 starts, seed 7: 2 at the best optimum", "... : the best one has not converged (iteration_limit)".
+std::string starts_in_words(const Json& multistart);
+// "optimum" if the optimiser converged, else "best point": the end of its search. status: as in result.json.
+const char* end_of_search(std::string_view status);
 
 // The place of a value between the bounds of a parameter, from 0 to 1, by its logarithm if that is its scale.
 struct Between {

@@ -98,6 +98,16 @@ void LongRun::stopped(const std::string& kept) {
   failure_ ? run_.failed(*failure_ + "; " + words) : run_.stopped(words);
 }
 
+void LongRun::failed(SolverStatus status, const std::string& message) {
+  if (status != SolverStatus::iteration_limit) return run_.failed(message);
+  const std::string& command = run_.context.command;
+  run_.failed(fmt::format(
+      "{}; raise {}.optimizer.max_iterations or max_evaluations, or go on from the best point: 'mbsopt {} {} --out "
+      "ANOTHER_DIR'",
+      message, command == "identify" ? "identification" : command, command,
+      (run_.folder.path() / "optimized.json").string()));
+}
+
 int LongRun::finish() {
   const int exit_code = run_.finish();
   finished_ = true;

@@ -14,6 +14,7 @@
 
 #include "app/files/journal.hpp"
 #include "app/run/run.hpp"
+#include "optim/solver/solver_outcome.hpp"
 
 namespace mbsopt {
 
@@ -36,6 +37,8 @@ class LongRun {
   void add(const char* kind, const Json& content);
   // Ends a stopped run. kept names the content of the folder.
   void stopped(const std::string& kept);
+  // Ends a failed search, whose best point is in optimized.json. At a limit of iterations it says what to change.
+  void failed(SolverStatus status, const std::string& message);
 
  private:
   void refuse_what_has_changed() const;

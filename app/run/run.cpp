@@ -14,6 +14,7 @@
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/start/model_warnings.hpp"
+#include "core/watch/start_failure.hpp"
 
 namespace mbsopt {
 namespace {
@@ -169,7 +170,7 @@ int Run::finish() {
 
 bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, bool integrated) {
   const Scene& scene = run.problem.scene;
-  const bool ok = assembly.result().ok;
+  bool ok = assembly.result().ok;
   if (ok) {
     ModelSummary model = assembly.summary();
     if (integrated) add_model(mechanism, scene.simulation, model);
@@ -179,6 +180,11 @@ bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, b
     run.failed(assembly.result().message, scene.simulation.start_time);
   }
   for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
+  if (integrated && !massless_bodies(mechanism, assembly).empty()) {
+    const double start = scene.simulation.start_time;
+    run.failed(start_failure(mechanism.data(), start), start);
+    ok = false;
+  }
   return ok;
 }
 

@@ -79,7 +79,8 @@ ReadOptions read_options(const CommandContext& context);
 std::vector<std::string> data_files(const Problem& problem, const NamedTerms& terms);
 
 // Adds the model at its assembled start to the result and to standard output, with warnings of oddities. Returns false
-// if the assembly failed, which then is the outcome of the run. integrated: a model of motion is integrated.
+// if the assembly failed, which then is the outcome of the run. integrated: a model of motion is integrated, so that
+// bodies also need mass where no joint holds them.
 bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, bool integrated = true);
 
 // Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.

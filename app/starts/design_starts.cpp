@@ -203,7 +203,8 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& seeded,
       best ? told_again(from((*best)["start"].get<int>()), scale, mode_of((*best)["start"].get<int>(), modes), *best)
            : run_design(from(0), until_interrupted);
   if (best) describe_given(problem, before, result.design);
-  result.design.simulations += outcome.simulations, result.design.wall_seconds += outcome.wall_seconds;
+  // The best run is repeated from its points, which is no further search.
+  result.design.simulations = outcome.simulations, result.design.wall_seconds = outcome.wall_seconds;
   return result;
 }
 

@@ -12,13 +12,13 @@ namespace {
 
 constexpr double kSameOptimum = 1e-3;  // of the range of a parameter, in its scale
 
+}  // namespace
+
 bool is_an_optimum(const Json& record) {
   const std::string status = record.value("status", "");
   return status.starts_with("converged") && record["objective"].is_number() &&
          record.value("infeasibility", 0.0) <= kFeasible;
 }
-
-}  // namespace
 
 bool same_optimum(const Json& a, const Json& b, const Scene& scene) {
   for (const auto& [name, value] : a["parameters"].items()) {

@@ -20,6 +20,9 @@ namespace mbsopt {
 
 inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: what ranks as feasible
 
+// Whether a start converged with all limits held.
+bool is_an_optimum(const Json& record);
+
 // Whether two optima agree within 1e-3 of the range of each bounded parameter, or of its logarithm if that is the
 // scale.
 bool same_optimum(const Json& a, const Json& b, const Scene& scene);

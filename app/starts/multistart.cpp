@@ -8,6 +8,7 @@
 #include <set>
 #include <tuple>
 
+#include "app/report/report_parts.hpp"
 #include "app/starts/distinct_optima.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
@@ -138,11 +139,12 @@ bool compute_batches(Run& run, LongRun& long_run, const MultistartSpec& spec, co
 
 void tell_starts(Run& run, const MultistartSpec& spec, const MultistartOutcome& outcome) {
   const Json* const best = outcome.best();
-  const long same = best ? std::ranges::count_if(outcome.ranked,
-                                                 [&](const Json& r) {
-                                                   return has_objective(r) && same_optimum(*best, r, run.problem.scene);
-                                                 })
-                         : 0;
+  const long same = best && is_an_optimum(*best)
+                        ? std::ranges::count_if(outcome.ranked,
+                                                [&](const Json& r) {
+                                                  return has_objective(r) && same_optimum(*best, r, run.problem.scene);
+                                                })
+                        : 0;
   Json& result = run.result["multistart"];
   result = {{"starts", spec.starts},
             {"seed", *spec.seed},
@@ -154,8 +156,7 @@ void tell_starts(Run& run, const MultistartSpec& spec, const MultistartOutcome& 
             {"at_the_best_optimum", same}};
   for (const Json& record : outcome.ranked) result["waterfall"].push_back(without_points(record));
   print_waterfall(run.context.out, outcome.ranked);
-  run.context.out << fmt::format("{}, seed {}: {} at the best optimum\n",
-                                 counted(static_cast<long>(outcome.ranked.size()), "start"), *spec.seed, same);
+  run.context.out << starts_in_words(result) << '\n';
   const auto ended = [&](const char* optimum) {
     return std::ranges::count_if(outcome.ranked, [&](const Json& r) { return r.value("optimum", "") == optimum; });
   };
@@ -175,7 +176,7 @@ const Json* MultistartOutcome::best() const {
 std::string effort(const Run& run, long simulations, double wall_seconds) {
   std::string of;
   if (run.result.contains("multistart"))
-    of = fmt::format(" in all {}", counted(run.result["multistart"]["finished"].get<long>(), "start"));
+    of = " in " + counted_starts(run.result["multistart"]);
   else if (run.context.options.resume)
     of = " since it was resumed";
   return fmt::format("{}, {:.3g} s{}", counted(simulations, "simulation"), wall_seconds, of);

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "core/sensor/body_at.hpp"
+#include "core/start/model_warnings.hpp"
 #include "core/step/step_failure.hpp"
 #include "core/watch/jump_watch.hpp"
 #include "core/watch/run_guard.hpp"
@@ -55,7 +56,7 @@ ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& set
   }
   flow_.start(settings.start_time, assembly_.result().angles);
   *y_ = assembly_.result().y;
-  if (!flow_.evaluate(settings.start_time, *y_)) {
+  if (!flow_.evaluate(settings.start_time, *y_) || !massless_bodies(mechanism, assembly_).empty()) {
     stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), settings.start_time));
     return;
   }

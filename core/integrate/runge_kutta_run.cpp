@@ -8,6 +8,7 @@
 
 #include "core/run/kinks.hpp"
 #include "core/sensor/body_at.hpp"
+#include "core/start/model_warnings.hpp"
 #include "core/step/event_times.hpp"
 #include "core/step/kink_times.hpp"
 #include "core/step/step_control.hpp"
@@ -141,7 +142,8 @@ bool RungeKuttaRun::begin(const Eigen::VectorXd& y_initial, const Eigen::VectorX
     return false;
   }
   penalty_ = PenaltyWatch(mechanism_.data());
-  if (!attempt_.begin()) {
+  // Rounding errors can hide a singular mass matrix, and give accelerations without meaning.
+  if (!attempt_.begin() || (!frozen && !massless_bodies(mechanism_.data(), y_initial).empty())) {
     course.stop(SimulationStatus::not_finite,
                 start_failure(mechanism_.data(), attempt_.step.t) + about_alpha(settings_.formulation));
     return false;

@@ -261,7 +261,9 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
   } else {
     if (joint.normal1 || joint.normal2) throw SceneError(joint_path + ": give both normal1 and normal2, or neither");
     if (zero == Zero::normals && (numbers(a1) - numbers(a2)).norm() > 1e-12) {
-      throw SceneError(joint_path + ": its angle is used and axis1 differs from axis2: give normal1 and normal2");
+      throw SceneError(
+          joint_path +
+          ": its angle is used and axis1 differs from axis2: make them equal, or give normal1 and normal2");
     }
     for (std::size_t k = 0; k < 3 && zero == Zero::normals; ++k) {
       constexpr double kSame = 1e-12;

@@ -65,7 +65,8 @@ void check_normals(Checker& checker, const Joint& joint, const std::optional<Vec
   if (joint.normal1 || joint.normal2 || !axis1 || !axis2) return;
   const Vector difference{(*axis1)[0] - (*axis2)[0], (*axis1)[1] - (*axis2)[1], (*axis1)[2] - (*axis2)[2]};
   if (norm(difference) > kSame && angle_is_used(checker.facts().scene(), joint.name, joint.type))
-    checker.issue(checker.path(), "its angle is used and axis1 differs from axis2: give normal1 and normal2");
+    checker.issue(checker.path(),
+                  "its angle is used and axis1 differs from axis2: make them equal, or give normal1 and normal2");
 }
 
 void check_joint_has(Checker& checker, std::string_view key, const std::string& name, std::string_view what) {

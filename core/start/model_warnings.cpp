@@ -260,10 +260,13 @@ std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assemb
 }
 
 std::vector<int> massless_bodies(const Mechanism& mechanism, const Assembly& assembly) {
+  if (!assembly.result().ok) return {};
+  return massless_bodies(mechanism.data(), assembly.result().y);
+}
+
+std::vector<int> massless_bodies(const MechanismData& data, const VectorXd& y) {
   std::vector<int> bodies;
-  if (!assembly.result().ok) return bodies;
-  const MechanismData& d = mechanism.data();
-  for (const auto& [body, turns] : massless_directions(d, assembly.result().y.head(7 * d.n))) bodies.push_back(body);
+  for (const auto& [body, turns] : massless_directions(data, y.head(7 * data.n))) bodies.push_back(body);
   return bodies;
 }
 

@@ -16,6 +16,8 @@ namespace mbsopt {
 std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assembly& assembly);
 // The bodies with massless directions, counted from 1; none if the assembly failed.
 std::vector<int> massless_bodies(const Mechanism& mechanism, const Assembly& assembly);
+// The same at an assembled state.
+std::vector<int> massless_bodies(const MechanismData& data, const Eigen::VectorXd& y);
 // The first two of these warnings, which can explain the end of a simulation.
 std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assembly& assembly);
 

@@ -110,6 +110,7 @@ void judge_stationarity(const DesignSpec& spec, DesignResult& result) {
 
 // Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
 void judge_true_extremes(const DesignProgram& program, const CaseEvaluator& evaluator, DesignResult& result) {
+  if (result.status == SolverStatus::infeasible) return;  // the conflicts name what is missed
   bool beyond = false;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     const DesignConstraint& c = result.constraints[i];
@@ -127,14 +128,22 @@ void judge_true_extremes(const DesignProgram& program, const CaseEvaluator& eval
       continue;
     }
     const bool equality = c.lower && c.upper && *c.lower == *c.upper;
-    const double size = program.size(static_cast<Eigen::Index>(i));
-    if (c.true_violation <= (equality ? kTrueLimitTolerance * size : 0)) continue;
-    beyond = true;
-    const bool above = c.upper && *c.true_value > *c.upper;
-    result.warnings.push_back(
-        fmt::format("{} is {:.6g}, {} the limit {:.6g}, though its smooth value is {:.6g}; more sharpness brings the "
-                    "two together",
-                    place, *c.true_value, above ? "above" : "below", above ? *c.upper : *c.lower, c.value));
+    const double tolerance = kTrueLimitTolerance * program.size(static_cast<Eigen::Index>(i));
+    if (c.true_violation > (equality ? tolerance : 0)) {
+      beyond = true;
+      const bool above = c.upper && *c.true_value > *c.upper;
+      result.warnings.push_back(
+          fmt::format("{} is {:.6g}, {} the limit {:.6g}, though its smooth value is {:.6g}; more sharpness brings the "
+                      "two together",
+                      place, *c.true_value, above ? "above" : "below", above ? *c.upper : *c.lower, c.value));
+    } else if (c.price != 0 && !equality && result.status == SolverStatus::converged) {
+      const double bound = c.at_upper ? *c.upper : *c.lower, unused = std::abs(*c.true_value - bound);
+      if (unused > tolerance)
+        result.warnings.push_back(fmt::format(
+            "{} is {:.6g}: the limit {:.6g} binds, but {:.2g} of it is unused, which the accuracy of the optimiser "
+            "cannot tell from the limit; a smaller design.optimizer.tolerance may use more",
+            place, *c.true_value, bound, unused));
+    }
   }
   if (!beyond || result.status != SolverStatus::converged) return;
   result.status = SolverStatus::converged_beyond_limit;
@@ -190,7 +199,7 @@ void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, 
 }
 
 void describe_solution(DesignProgram& program, const VariableScaling& scaling, const LimitedSolution& rounds,
-                       DesignResult& result) {
+                       double tolerance, DesignResult& result) {
   const Eigen::VectorXd& x = rounds.solution.x;
   result.final_evaluation = program.evaluation(result.rho);
   describe_objective(program, rounds.true_values, result);
@@ -214,7 +223,9 @@ void describe_solution(DesignProgram& program, const VariableScaling& scaling, c
     const Eigen::Index row = static_cast<Eigen::Index>(i);
     const double fall =
         found.multipliers(row) * program.c_scale(row) / (program.f_scale * program.size(row) * rounds.slopes(row));
-    c.price = c.lower && c.upper && *c.lower == *c.upper ? fall : std::abs(fall);
+    const bool equality = c.lower && c.upper && *c.lower == *c.upper, binds = found.binds(row, tolerance);
+    c.price = equality ? fall : binds ? std::abs(fall) : 0;
+    c.at_lower = c.at_lower || (binds && fall < 0), c.at_upper = c.at_upper || (binds && fall > 0);
   }
   if (result.status == SolverStatus::infeasible) describe_conflict(program, scaling, x, end, result);
 }

@@ -19,8 +19,9 @@ void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, 
                   DesignResult& result);
 
 // Evaluates the solution once more: true extremes, optimality, prices of limits, limits in conflict.
+// tolerance: the optimiser's; a limit whose multiplier balances less of the gradient does not bind.
 void describe_solution(DesignProgram& program, const VariableScaling& scaling, const LimitedSolution& rounds,
-                       DesignResult& result);
+                       double tolerance, DesignResult& result);
 
 // Takes `converged` back if the optimality of a solved least-squares fit is not small, or true extremes break limits.
 void judge_solution(const DesignSpec& spec, const DesignProgram& program, const CaseEvaluator& evaluator,

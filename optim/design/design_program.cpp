@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "optim/objective/gauss_newton.hpp"
 #include "optim/objective/hessian.hpp"
@@ -86,21 +87,23 @@ CaseEvaluation DesignProgram::start_from(const VectorXd& x_start, const std::opt
   const NlpScale scale = given ? *given : scale_at(x_start);
   f_scale = scale.f, c_scale = scale.c;
   const CaseEvaluation start = evaluator_.gradients(rho_at(x_start));  // in memory, unless the scale is given
-  if (start.ok) best_ = start, best_f_ = objective_.value(minimised(start.psi)), best_violation_ = violation_of(start);
+  if (start.ok)
+    best_ = start, best_f_ = objective_.value(minimised(start.psi)), best_violations_ = violations_of(start);
   return start;
 }
 
 void DesignProgram::set_bounds(Index constraint, const std::optional<double>& lower,
                                const std::optional<double>& upper) {
-  if (lower) c_lower(constraint) = *lower / size_(constraint);
-  if (upper) c_upper(constraint) = *upper / size_(constraint);
-  if (best_.ok) best_violation_ = violation_of(best_);
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  c_lower(constraint) = lower.value_or(-kNone) / size_(constraint);
+  c_upper(constraint) = upper.value_or(kNone) / size_(constraint);
+  if (best_.ok) best_violations_ = violations_of(best_);
 }
 
-double DesignProgram::violation_of(const Evaluation& e) const {
+double DesignProgram::violations_of(const Evaluation& e) const {
   VectorXd c(constraints());
   for (Index i = 0; i < constraints(); ++i) c(i) = e.psi(psi_of(i)) / size_(i);
-  return violation(c);
+  return sum_of_violations(c, kConstraintTolerance);
 }
 
 VectorXd DesignProgram::rho_at(const VectorXd& x) const {
@@ -128,9 +131,9 @@ void DesignProgram::fill(const CaseEvaluation& e, const VectorXd& x, NlpPoint& p
 
 void DesignProgram::keep(const CaseEvaluation& e) {
   if (!e.ok || &e == &best_) return;
-  const double f = objective_.value(minimised(e.psi)), now = violation_of(e);
-  if (best_.ok && !is_better(f, now, best_f_, best_violation_, kConstraintTolerance)) return;
-  best_ = e, best_f_ = f, best_violation_ = now;
+  const double f = objective_.value(minimised(e.psi)), now = violations_of(e);
+  if (best_.ok && !is_better(f, now, best_f_, best_violations_)) return;
+  best_ = e, best_f_ = f, best_violations_ = now;
 }
 
 void DesignProgram::evaluate(const VectorXd& x, NlpPoint& point) {

@@ -58,7 +58,7 @@ class DesignProgram : public NonlinearProgram {
   bool second_derivatives(const Eigen::VectorXd& rho, std::vector<Eigen::MatrixXd>& psi_rhorho);
   void fill(const CaseEvaluation& e, const Eigen::VectorXd& x, NlpPoint& point) const;
   void keep(const CaseEvaluation& e);
-  double violation_of(const Evaluation& e) const;
+  double violations_of(const Evaluation& e) const;
   Eigen::Index row_of(std::size_t load_case) const;  // in an evaluation, of the objective that is minimised
   Eigen::VectorXd f_rho(const Evaluation& e) const;
 
@@ -70,7 +70,7 @@ class DesignProgram : public NonlinearProgram {
   const Eigen::VectorXd rho_;  // the scene's values, which parameters that are not designed keep
   Eigen::VectorXd size_;       // of each constraint's bounds
   CaseEvaluation best_;
-  double best_f_ = 0, best_violation_ = 0;
+  double best_f_ = 0, best_violations_ = 0;
   long hessian_gradients_ = 0;
   std::string hessian_failure_;
   const bool gauss_newton_;

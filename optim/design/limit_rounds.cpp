@@ -8,7 +8,9 @@
 #include "optim/design/true_limits.hpp"
 #include "optim/problem/seed.hpp"
 #include "optim/solver/ipopt_solver.hpp"
+#include "optim/solver/nlopt_methods.hpp"
 #include "optim/solver/nlopt_solver.hpp"
+#include "optim/solver/optimality.hpp"
 
 namespace mbsopt {
 namespace {
@@ -79,8 +81,10 @@ bool is_an_end(SolverStatus status) {
 
 bool is_an_improvement(const DesignProgram& program, const NlpResult& found, const NlpResult& before) {
   if (found.status == SolverStatus::converged) return true;
-  return found.point.ok && is_better(found.point.f, program.violation(found.point.c), before.point.f,
-                                     program.violation(before.point.c), kConstraintTolerance);
+  const auto violations = [&](const NlpResult& r) {
+    return program.sum_of_violations(r.point.c, kConstraintTolerance);
+  };
+  return found.point.ok && is_better(found.point.f, violations(found), before.point.f, violations(before));
 }
 
 // The hooks of a later round, whose iterations follow those of the rounds before.
@@ -122,6 +126,28 @@ void solve_again(const DesignSpec& spec, DesignProgram& program, const CaseEvalu
   }
 }
 
+// The side on which each constraint holds the objective back, if the method has derivatives and can hold equalities.
+Eigen::VectorXi binding_sides(const OptimizerSpec& spec, const DesignProgram& program, const NlpResult& solution) {
+  const NloptMethod* const method = find_nlopt_method(spec.type);
+  Eigen::VectorXi sides = Eigen::VectorXi::Zero(program.constraints());
+  const bool holds_equalities = spec.type == "ipopt" || (method && method->gradients && !method->global &&
+                                                         method->constraints != ConstraintSupport::inequalities);
+  if (!holds_equalities) return sides;
+  const Stationarity found = stationarity(program, solution.x, solution.point);
+  for (Eigen::Index i = 0; i < sides.size(); ++i)
+    if (found.binds(i, spec.tolerance)) sides(i) = found.multipliers(i) > 0 ? 1 : -1;
+  return sides;
+}
+
+// Goes back to the solution `before`, whose limits held, with the counts of both.
+void go_back(const NlpResult& before, NlpResult& solution) {
+  const NlpResult later = solution;
+  solution = before;
+  solution.iterations = later.iterations, solution.evaluations = later.evaluations;
+  solution.failed_evaluations = later.failed_evaluations;
+  if (later.status == SolverStatus::stopped) solution.status = later.status, solution.message = later.message;
+}
+
 }  // namespace
 
 LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, CaseEvaluator& evaluator,
@@ -132,10 +158,20 @@ LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, 
   solution = solved_once(program, evaluator, x_start, spec.optimizer, hooks, result);
   while (solution.point.ok && !hooks.abandoned()) {
     rounds.true_values = evaluator.true_values(program.rho_at(solution.x));
-    if (!is_an_end(solution.status) || !limits.move(program, solution.point.c, rounds.true_values)) break;
+    if (!is_an_end(solution.status)) break;
+    const TrueLimits limits_before = limits;
+    if (!limits.move(program, solution.point.c, rounds.true_values, binding_sides(spec.optimizer, program, solution)))
+      break;
+    const NlpResult before = solution;
     solve_again(spec, program, evaluator, x_start, hooks, solution, result);
+    const bool as_good = solution.status == SolverStatus::converged || solution.status == before.status;
+    if (as_good || !limits_before.hold(program, rounds.true_values)) continue;
+    go_back(before, solution);
+    limits = limits_before;
+    break;
   }
   result.limit_rounds = limits.rounds();
+  limits.set_inequalities(program);
   rounds.slopes.resize(program.constraints());
   for (Eigen::Index i = 0; i < program.constraints(); ++i) rounds.slopes(i) = limits.slope(i);
   return rounds;

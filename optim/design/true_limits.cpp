@@ -17,6 +17,11 @@ constexpr double kLeastSlope = 0.2, kLargestSlope = 20;
 // A change of psi below it is lost in what solutions scatter by.
 constexpr double kNoChange = 1e-4;
 
+template <class Limit>
+bool is_equality(const Limit& l) {
+  return l.lower && l.upper && *l.lower == *l.upper;
+}
+
 }  // namespace
 
 TrueLimits::TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator) {
@@ -28,14 +33,16 @@ TrueLimits::TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator) {
   }
 }
 
-bool TrueLimits::is_settled(const Limit& l, double psi, double X) {
-  const bool equality = l.lower && l.upper && *l.lower == *l.upper;
-  if (equality) return std::abs(X - *l.upper) <= kUnused * l.size;
-  const auto on = [&](const std::optional<double>& bound) {
-    return bound && std::abs(psi - *bound) <= kOnBound * l.size;
-  };
-  if (l.upper && (X > *l.upper || (on(l.smooth_upper) && X < *l.upper - kUnused * l.size))) return false;
-  if (l.lower && (X < *l.lower || (on(l.smooth_lower) && X > *l.lower + kUnused * l.size))) return false;
+bool TrueLimits::is_kept(const Limit& l, double X) {
+  const double tolerance = is_equality(l) ? kUnused * l.size : 0;
+  return (!l.upper || X <= *l.upper + tolerance) && (!l.lower || X >= *l.lower - tolerance);
+}
+
+bool TrueLimits::is_settled(const Limit& l, double psi, double X, int side) {
+  if (!is_kept(l, X)) return false;
+  const auto on = [&](const std::optional<double>& bound) { return std::abs(psi - *bound) <= kOnBound * l.size; };
+  if (l.upper && (side > 0 || on(l.smooth_upper)) && X < *l.upper - kUnused * l.size) return false;
+  if (l.lower && (side < 0 || on(l.smooth_lower)) && X > *l.lower + kUnused * l.size) return false;
   return true;
 }
 
@@ -46,27 +53,49 @@ void TrueLimits::learn(Limit& l, double psi, double X) {
 }
 
 void TrueLimits::move(Limit& l, double psi, double X) {
-  const double inside = l.lower && l.upper && *l.lower == *l.upper ? 0 : 0.5 * kUnused * l.size;
+  const double inside = is_equality(l) ? 0 : 0.5 * kUnused * l.size;
   if (l.upper) l.smooth_upper = psi + (*l.upper - inside - X) / l.slope;
   if (l.lower) l.smooth_lower = psi + (*l.lower + inside - X) / l.slope;
 }
 
+void TrueLimits::set_bounds(const Limit& l, int held, DesignProgram& program) {
+  program.set_bounds(l.constraint, held > 0 ? l.smooth_upper : l.smooth_lower,
+                     held < 0 ? l.smooth_lower : l.smooth_upper);
+}
+
 bool TrueLimits::move(DesignProgram& program, const Eigen::VectorXd& c,
-                      const std::vector<std::optional<double>>& true_values) {
+                      const std::vector<std::optional<double>>& true_values, const Eigen::VectorXi& sides) {
+  const bool all_kept = hold(program, true_values);
   bool moved = false;
   for (Limit& l : limits_) {
     const std::optional<double>& X = true_values[static_cast<std::size_t>(program.psi_of(l.constraint))];
     if (!X) continue;
     l.size = program.size(l.constraint);
     const double value = c(l.constraint) * l.size;
+    const int side = all_kept && !is_equality(l) ? sides(l.constraint) : 0;
+    const bool released = l.held * sides(l.constraint) < 0;
     learn(l, value, *X);
-    if (is_settled(l, value, *X)) continue;
+    if (!released && is_settled(l, value, *X, side)) continue;
     moved = true;
-    if (rounds_ < kRounds) move(l, value, *X), program.set_bounds(l.constraint, l.smooth_lower, l.smooth_upper);
+    if (rounds_ == kRounds) continue;
+    if (released) l.held = 0, l.may_be_held = false;
+    if (l.may_be_held && side != 0) l.held = side;
+    move(l, value, *X), set_bounds(l, l.held, program);
   }
   if (!moved || rounds_ == kRounds) return false;
   ++rounds_;
   return true;
+}
+
+bool TrueLimits::hold(const DesignProgram& program, const std::vector<std::optional<double>>& true_values) const {
+  return std::ranges::all_of(limits_, [&](const Limit& l) {
+    const std::optional<double>& X = true_values[static_cast<std::size_t>(program.psi_of(l.constraint))];
+    return X && is_kept(l, *X);
+  });
+}
+
+void TrueLimits::set_inequalities(DesignProgram& program) const {
+  for (const Limit& l : limits_) set_bounds(l, 0, program);
 }
 
 double TrueLimits::slope(Eigen::Index constraint) const {

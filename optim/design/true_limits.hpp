@@ -4,10 +4,12 @@
 //
 //   b <- psi + (U - X)/s      psi: the smooth value at the solution,  s: slope dX/dpsi between the last two; 1 at first
 //
-// Each case has its own.
+// A barrier, or a tolerance on the product of multiplier and slack, leaves psi inside a bound of a small multiplier. If
+// the multiplier says that the limit binds, and all limits hold, further rounds hold psi = b. If the multiplier changes
+// its sign there, the limit does not bind, and its bound is an inequality again. Each case has its own limits.
 //
 //   TrueLimits limits(spec, evaluator);
-//   do solve(program); while (limits.move(program, psi, evaluator.true_values(rho)));
+//   do solve(program); while (limits.move(program, psi, evaluator.true_values(rho), sides));
 #pragma once
 
 #include <Eigen/Core>
@@ -28,9 +30,16 @@ class TrueLimits {
   // The evaluator's objectives: the one that is minimised, then those that are bounded.
   TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator);
 
-  // c: of the program at the solution; true values: of the evaluator. False where the limits hold and are used, or
-  // where the bounds were moved often enough; otherwise the program has new bounds.
-  bool move(DesignProgram& program, const Eigen::VectorXd& c, const std::vector<std::optional<double>>& true_values);
+  // c: of the program at the solution; true values: of the evaluator; sides: per constraint 1 where its upper bound
+  // holds the objective back, -1 where the lower one does, else 0. False where the limits hold and are used, or where
+  // the bounds were moved often enough; otherwise the program has new bounds.
+  bool move(DesignProgram& program, const Eigen::VectorXd& c, const std::vector<std::optional<double>>& true_values,
+            const Eigen::VectorXi& sides);
+
+  // Whether the true values keep the limits, used or not.
+  bool hold(const DesignProgram& program, const std::vector<std::optional<double>>& true_values) const;
+  // Gives the program the bounds of these limits, all inequalities.
+  void set_inequalities(DesignProgram& program) const;
 
   int rounds() const { return rounds_; }  // in which bounds were moved
   // dX/dpsi of a constraint along the solutions; 1 where it is no extreme.
@@ -44,8 +53,12 @@ class TrueLimits {
     std::optional<double> smooth_lower, smooth_upper;  // what the program holds
     std::optional<double> psi = {}, X = {};            // of the round before
     double slope = 1;                                  // dX/dpsi
+    int held = 0;                                      // side whose bound is an equality
+    bool may_be_held = true;
   };
-  static bool is_settled(const Limit& limit, double psi, double X);
+  static bool is_kept(const Limit& limit, double X);
+  static bool is_settled(const Limit& limit, double psi, double X, int side);
+  static void set_bounds(const Limit& limit, int held, DesignProgram& program);
   static void learn(Limit& limit, double psi, double X);
   static void move(Limit& limit, double psi, double X);
 

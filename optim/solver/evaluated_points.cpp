@@ -22,9 +22,9 @@ bool is_finite(const NlpPoint& p, Wanted wanted) {
 
 }  // namespace
 
-bool is_better(double f, double violation, double than_f, double than_violation, double constraint_tolerance) {
-  if (than_violation <= constraint_tolerance) return violation <= constraint_tolerance && f < than_f;
-  return violation < than_violation;
+bool is_better(double f, double violations, double than_f, double than_violations) {
+  if (than_violations == 0) return violations == 0 && f < than_f;
+  return violations < than_violations;
 }
 
 EvaluatedPoints::EvaluatedPoints(NonlinearProgram& problem, SolverOutcome& outcome, double constraint_tolerance,
@@ -82,9 +82,8 @@ NlpPoint EvaluatedPoints::computed(Wanted wanted) {
 }
 
 void EvaluatedPoints::keep_best(const NlpPoint& point) {
-  const double violation = problem_.violation(point.c);
-  is_better_ =
-      !have_best_ || mbsopt::is_better(point.f, violation, best_.f, problem_.violation(best_.c), constraint_tolerance_);
+  const auto violations = [&](const NlpPoint& p) { return problem_.sum_of_violations(p.c, constraint_tolerance_); };
+  is_better_ = !have_best_ || mbsopt::is_better(point.f, violations(point), best_.f, violations(best_));
   if (is_better_) best_x_ = x_, best_ = point, have_best_ = true;
 }
 

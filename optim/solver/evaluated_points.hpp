@@ -57,7 +57,8 @@ class EvaluatedPoints {
   std::string last_error_;
 };
 
-// Feasible before infeasible, less infeasible before more, then the lower objective.
-bool is_better(double f, double violation, double than_f, double than_violation, double constraint_tolerance);
+// Feasible before infeasible, less infeasible before more, then the lower objective. The violations are sums, 0 where
+// feasible.
+bool is_better(double f, double violations, double than_f, double than_violations);
 
 }  // namespace mbsopt

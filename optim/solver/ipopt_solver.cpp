@@ -19,6 +19,7 @@
 #include "optim/solver/optimality.hpp"
 #include "optim/solver/search_watch.hpp"
 #include "optim/solver/secant_curvature.hpp"
+#include "optim/solver/stationary_point.hpp"
 #include "optim/solver/third_order_step.hpp"
 
 namespace mbsopt {
@@ -46,6 +47,7 @@ class Adapter : public Ipopt::TNLP {
         options_(options),
         result_(result),
         points_(problem, result, options.constraint_tolerance, options.records),
+        solution_(problem, points_, options.tolerance, options.constraint_tolerance),
         secants_(1 / problem.f_scale),
         watch_(options.tolerance, problem.constraints() == 0),
         second_order_(options.second_order) {
@@ -151,6 +153,7 @@ class Adapter : public Ipopt::TNLP {
                              Number, Number, Index, const Ipopt::IpoptData*,
                              Ipopt::IpoptCalculatedQuantities*) override {
     if (round_ > 0 && iteration == 0) return true;  // the start of this round
+    if (point_->abandoned) return false;            // Ipopt counts a step that was not computed
     result_.iterations = iterations_before_ + iteration;
     out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
     if (iterate_.size() == 0) return !out_of_evaluations_;
@@ -172,10 +175,6 @@ class Adapter : public Ipopt::TNLP {
     if (end_ != SearchEnd::optimal && end_ != SearchEnd::stalled) final_ = VectorIn(x, n);
   }
 
-  double final_distance() {
-    return final_.size() > 0 && evaluate(final_) ? optimality(problem_, final_, *point_) : kUnknown;
-  }
-
   // The optimality of the end point of a stalled search.
   double distance() const { return watch_.most_stationary().distance; }
 
@@ -193,27 +192,28 @@ class Adapter : public Ipopt::TNLP {
     ++round_;
   }
 
-  // Ipopt gives up if the noise of a constraint exceeds its tolerance, or no step lowers the objective by more than
-  // noise. The best point may still be optimal.
-  bool best_is_optimal() const {
-    return points_.have_best() && points_.feasible(points_.best()) &&
-           optimality(problem_, points_.best_x(), points_.best()) <= kAcceptable * options_.tolerance;
-  }
   bool best_is_feasible() const { return points_.have_best() && points_.feasible(points_.best()); }
 
-  // Takes the solution if Ipopt converged, else the best point.
-  void finish(bool converged) {
+  // Takes Ipopt's end point if it converged, else the best point. In noise another one may be as good and more
+  // stationary. Returns the optimality.
+  double finish(bool converged) {
     if (converged && final_.size() > 0 && evaluate(final_)) {
       result_.x = points_.x(), result_.point = *point_;
     } else if (points_.have_best()) {
       result_.x = points_.best_x(), result_.point = points_.best();
     }
+    if (!result_.point.ok) return kUnknown;
+    const double distance = optimality(problem_, result_.x, result_.point);
+    if (!solution_.found() || solution_.distance() >= distance) return distance;
+    result_.x = solution_.x(), result_.point = solution_.point();
+    return solution_.distance();
   }
 
  private:
   // Interior points may leave the bounds by a rounding error; EvaluatedPoints moves them back.
   bool evaluate(const Eigen::VectorXd& x) {
     point_ = &points_.at(x, Wanted::derivatives);
+    if (points_.is_new() && point_->ok) solution_.look(*point_);
     return point_->ok;
   }
 
@@ -284,6 +284,7 @@ class Adapter : public Ipopt::TNLP {
   const IpoptOptions& options_;
   NlpResult& result_;
   EvaluatedPoints points_;
+  StationaryPoint solution_;
   SecantCurvature secants_;
   const NlpPoint* point_ = nullptr;  // the last one
   Eigen::VectorXd final_, iterate_, hessians_x_;
@@ -428,17 +429,20 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
     if (!adapter->lost() && !(ended && adapter->passed_a_better_point())) break;
     adapter->go_on_from_best();
   }
+  const double distance =
+      adapter->finish(outcome.status == SolverStatus::converged || adapter->end() == SearchEnd::stalled);
+  if (adapter->end() == SearchEnd::stalled) outcome = stalled_in_words(distance, result, options);
   result.status = outcome.status, result.message = outcome.words;
-  if (outcome.status == SolverStatus::converged && adapter->final_distance() > options.tolerance)
-    result.message +=
-        fmt::format(" (as Ipopt measures them; by the measure of all methods to {:.1e})", adapter->final_distance());
+  if (outcome.status == SolverStatus::converged && distance > options.tolerance)
+    result.message += fmt::format(" (as Ipopt measures them; by the measure of all methods to {:.1e})", distance);
   if (adapter->left_newton_at() > 0)
     result.message +=
         fmt::format("; by L-BFGS from iteration {} on, since steps by Hessians gained less than 1 % in {}",
                     adapter->left_newton_at(), counted(SearchWatch::kCreeping, "iteration"));
-  adapter->finish(outcome.status == SolverStatus::converged || adapter->end() == SearchEnd::stalled);
+  // Ipopt gives up if the noise of a constraint exceeds its tolerance, or no step lowers the objective by more than
+  // noise. The best point may still be optimal.
   const bool gave_up = outcome.status == SolverStatus::no_progress || outcome.status == SolverStatus::infeasible;
-  if (gave_up && adapter->best_is_optimal()) {
+  if (gave_up && adapter->best_is_feasible() && distance <= kAcceptable * options.tolerance) {
     result.status = SolverStatus::converged, result.message = kConvergedInNoise;
   } else if (outcome.status == SolverStatus::infeasible && adapter->best_is_feasible()) {
     result.status = SolverStatus::no_progress;

@@ -15,6 +15,7 @@
 #include "core/expression/counted.hpp"
 #include "optim/solver/evaluated_points.hpp"
 #include "optim/solver/optimality.hpp"
+#include "optim/solver/stationary_point.hpp"
 
 namespace mbsopt {
 namespace {
@@ -46,6 +47,7 @@ class Adapter {
         options_(options),
         result_(result),
         points_(problem, result, options.constraint_tolerance, options.records),
+        solution_(problem, points_, options.tolerance, options.constraint_tolerance),
         wanted_(method.gradients ? Wanted::derivatives : Wanted::values),
         max_evaluations_(options.max_evaluations.value_or(default_max_evaluations(method, problem.variables()))) {
     for (Index i = 0; i < problem.constraints(); ++i) {
@@ -267,22 +269,13 @@ class Adapter {
            optimality(problem_, result_.x, result_.point) > kAcceptable * options_.tolerance;
   }
 
-  // A constraint violation within its tolerance allows a lower objective. So among points whose objectives differ by no
-  // more than the tolerances, the most stationary one is the solution.
-  bool as_good_as_best(double f) const {
-    const double margin = std::max(options_.tolerance, 10 * options_.constraint_tolerance);
-    return (f - points_.best().f) * problem_.f_scale <= margin;
-  }
   void look_at_optimality(const NlpPoint& point) {
-    if (!method_.gradients || method_.global || !points_.feasible(point) || !as_good_as_best(point.f)) return;
-    const double distance = optimality(problem_, points_.x(), point);
-    if (solution_x_.size() == 0 || !as_good_as_best(solution_.f) || distance < solution_distance_)
-      solution_x_ = points_.x(), solution_ = point, solution_distance_ = distance;
-    if (distance <= options_.tolerance) end(Ended::converged);
+    if (!method_.gradients || method_.global) return;
+    if (solution_.look(point) <= options_.tolerance) end(Ended::converged);
   }
   void keep_solution() {
     if (points_.have_best()) result_.x = points_.best_x(), result_.point = points_.best();
-    if (solution_x_.size() > 0 && as_good_as_best(solution_.f)) result_.x = solution_x_, result_.point = solution_;
+    if (solution_.found()) result_.x = solution_.x(), result_.point = solution_.point();
   }
 
   // If a point fails, its function value is high, so that the method returns. With gradients it rises along the step by
@@ -401,6 +394,7 @@ class Adapter {
   const NloptOptions& options_;
   NlpResult& result_;
   EvaluatedPoints points_;
+  StationaryPoint solution_;
   const Wanted wanted_;
   const long max_evaluations_;
   std::vector<Side> inequalities_, equalities_;
@@ -409,9 +403,7 @@ class Adapter {
   std::exception_ptr exception_;
   std::string library_message_;
   NlpPoint last_good_, stand_in_;
-  VectorXd last_good_x_, solution_x_;
-  NlpPoint solution_;
-  double solution_distance_ = 0;
+  VectorXd last_good_x_;
   double f_worst_ = 0;
   bool creeps_ = false, handed_over_ = false;
   long next_look_ = kCreeping;

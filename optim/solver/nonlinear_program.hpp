@@ -79,6 +79,13 @@ struct NonlinearProgram {
     return std::max(0.0, (c_lower - c).cwiseMax(c - c_upper).maxCoeff());
   }
 
+  // The sum of all violations above the tolerance; 0 where none is. It has the kinks of the violations only, so that
+  // optimality conditions describe its minimum (optimality.hpp).
+  double sum_of_violations(const Eigen::VectorXd& c, double tolerance) const {
+    const Eigen::ArrayXd each = (c_lower - c).cwiseMax(c - c_upper).array();
+    return (each > tolerance).select(each, 0).sum();
+  }
+
   Eigen::VectorXd x_lower, x_upper, c_lower, c_upper;  // +-infinity where there is none
   double f_scale = 1;                                  // multiplies f where the solver tests convergence
   Eigen::VectorXd c_scale;                             // the same for c; ones

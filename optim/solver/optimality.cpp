@@ -122,7 +122,7 @@ Stationarity stationarity(const NonlinearProgram& problem, const VectorXd& x, co
     if (near(c, lower)) multipliers.push_back({i, -1, c - lower});
   }
   Stationarity found;
-  found.multipliers.setZero(problem.constraints());
+  found.multipliers.setZero(problem.constraints()), found.pulls.setZero(problem.constraints());
   double complementarity = 0;
   if (!multipliers.empty()) {
     const NearBounds bounds = near_bounds(problem, x, point, std::move(multipliers));
@@ -135,6 +135,8 @@ Stationarity stationarity(const NonlinearProgram& problem, const VectorXd& x, co
           std::max(complementarity, y(j) * problem.c_scale(multiplier.constraint) * std::abs(multiplier.slack));
     }
   }
+  for (Index i = 0; i < problem.constraints(); ++i)
+    found.pulls(i) = std::abs(found.multipliers(i)) * problem.c_scale(i) * point.c_x.row(i).lpNorm<Eigen::Infinity>();
   const VectorXd step = (-r).cwiseMin(problem.x_upper - x).cwiseMax(problem.x_lower - x);
   found.distance = std::max(step.cwiseAbs().maxCoeff(), complementarity);
   return found;

@@ -17,6 +17,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 
 #include "optim/solver/nonlinear_program.hpp"
 
@@ -28,6 +29,9 @@ double optimality(const NonlinearProgram& problem, const Eigen::VectorXd& x, con
 struct Stationarity {
   double distance = 0;          // the optimality
   Eigen::VectorXd multipliers;  // y
+  Eigen::VectorXd pulls;        // |y_i S_i c_x,i|_inf: the part of r that constraint i balances
+  // Whether constraint i holds the objective back: more than the tolerance and the distance would show without it.
+  bool binds(Eigen::Index i, double tolerance) const { return pulls(i) > std::max(tolerance, distance); }
 };
 Stationarity stationarity(const NonlinearProgram& problem, const Eigen::VectorXd& x, const NlpPoint& point);
 

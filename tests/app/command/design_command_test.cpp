@@ -51,7 +51,8 @@ TEST_CASE("design: a minimum inside the bounds, told in a table, a history and a
   CHECK(std::count(history.begin(), history.end(), '\n') == optimizer.at("iterations").get<int>() + 2);
 }
 
-// k >= 50 and 2 k <= 80 cannot both hold. Eased by 1, a limit lowers the sum of relative violations by 1/50 and 1/80.
+// k >= 50 and 2 k <= 80 cannot both hold. The sum of relative violations, (50 - k)/50 + max(0, 2 k - 80)/80, is least
+// at k = 40. Eased by 1, the limits lower it by 1/50 and 1/100.
 TEST_CASE("design: limits in conflict stand in the terminal with their prices", "[command]") {
   const TemporaryFolder folder;
   std::vector<std::string> sets = kBounds;
@@ -63,12 +64,12 @@ TEST_CASE("design: limits in conflict stand in the terminal with their prices", 
   const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), sets);
   CHECK(outcome.exit_code == kNumericalFailure);
   CHECK_THAT(outcome.out, Contains("limit in conflict") && Contains("missed by") && Contains("price") &&
-                              Contains("stiff >= 50") && Contains("twice <= 80") && Contains("0.0125"));
+                              Contains("stiff >= 50") && Contains("twice <= 80") && Contains("0.01"));
   const auto conflicts = json_of(folder.path / "out/result.json").at("conflicts");
   REQUIRE(conflicts.size() == 2);
   CHECK(conflicts[0].at("missed").get<double>() == Approx(10).epsilon(2e-3));
   CHECK(conflicts[0].at("price").get<double>() == Approx(1.0 / 50));
-  CHECK(conflicts[1].at("price").get<double>() == Approx(1.0 / 80));
+  CHECK(conflicts[1].at("price").get<double>() == Approx(1.0 / 100));
 }
 
 TEST_CASE("design: the report's headline has the violation of true extremes", "[command][report]") {
@@ -113,13 +114,33 @@ TEST_CASE("design: too few iterations is a failure in words that keeps the best 
   more.insert(more.end(), {"--set", "design.optimizer.max_iterations=1"});
   const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), more);
   CHECK(outcome.exit_code == kNumericalFailure);
-  CHECK_THAT(outcome.err, Contains("design failed: "));
+  const std::string advice =
+      "raise design.optimizer.max_iterations or max_evaluations, or go on from the best point: "
+      "'mbsopt design " +
+      folder.file("out/optimized.json");
+  CHECK_THAT(outcome.err, Contains("design failed: stopped at the limit of 1 iteration; ") && Contains(advice));
+  CHECK_THAT(outcome.out, Contains("best point") && !Contains("optimum"));
+  const CommandOutcome resumed = run_command({"resume", folder.file("out")});
+  CHECK_THAT(resumed.out, Contains("there is nothing to go on with: ") && Contains(advice));
   const auto result = json_of(folder.path / "out/result.json");
   CHECK(result.at("status") == "failed");
   CHECK(result.at("optimizer").at("objective_final") <= result.at("optimizer").at("objective_initial"));
   CHECK(fs::exists(folder.path / "out/optimized.json"));
   CHECK_THAT(content_of(folder.path / "out/report.html"),
              Contains("class=\"banner\"") && Contains("This run failed: stopped at the limit of 1 iteration"));
+}
+
+TEST_CASE("design says of the start what simulate says of it", "[command]") {
+  const TemporaryFolder folder;
+  std::vector<std::string> more = kBounds;
+  more.insert(more.end(), {"--set", "joints[0].point2=[0.3, 0, 0]"});
+  const std::string file = folder.write("rod.json", kPendulum);
+  std::vector<std::string> simulate{"simulate", file, "--out", folder.file("run")};
+  simulate.insert(simulate.end(), more.begin(), more.end());
+  const auto apart = Contains("leaves the points of joint 'pin' 0.3 m apart");
+  CHECK_THAT(run_command(simulate).err, apart);
+  CHECK_THAT(run_design_command(file, folder.file("out"), more).err, apart);
+  CHECK_THAT(json_of(folder.path / "out/result.json").at("warnings").dump(), apart);
 }
 
 TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {

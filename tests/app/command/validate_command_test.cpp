@@ -69,6 +69,25 @@ TEST_CASE("validate names the motion that redundant equations forbid twice", "[c
                                   "direction, turns about every axis normal to [0, 0, 1]"));
 }
 
+TEST_CASE("validate and simulate refuse motion without any mass", "[command]") {
+  const TemporaryFolder folder;
+  const std::string command = GENERATE(as<std::string>{}, "validate", "simulate", "design");
+  const CommandOutcome outcome = run_command({command, folder.write("rod.json", kPendulum), "--out", folder.file("out"),
+                                              "--set", "bodies[0].mass=0", "--set", "bodies[0].inertia=[0, 0, 0]"});
+  CHECK(outcome.exit_code == kNumericalFailure);
+  CHECK_THAT(outcome.err, Contains(command + " failed: the accelerations at the start, t = 0 s, cannot be computed. A "
+                                             "body without mass or inertia in a direction that no joint holds has "
+                                             "none: 'rod'. Give it some, or hold it"));
+}
+
+TEST_CASE("an axis of the wrong sign may be what makes the axes of a joint differ", "[command]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome = run_command({"validate", folder.write("rod.json", kPendulum), "--out",
+                                              folder.file("out"), "--set", "joints[0].axis2=[0, 0, -1]"});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("axis1 differs from axis2: make them equal, or give normal1 and normal2"));
+}
+
 TEST_CASE("validate takes a prescribed acceleration, which only kinematics uses", "[command]") {
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", R"({

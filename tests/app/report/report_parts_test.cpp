@@ -14,3 +14,18 @@ TEST_CASE("a value between bounds has its place on the scale of the parameter", 
   CHECK((*bounds_of(scene, "run1.c", bounds))(0.1) == Approx(0.25));
   CHECK_FALSE(bounds_of(scene, "k", {{"lower", 0.01}, {"upper", nullptr}}).has_value());
 }
+
+TEST_CASE("starts in words: how many of how many, and whether the best one is an optimum", "[report]") {
+  Json multistart{{"starts", 10}, {"finished", 10}, {"seed", 5}, {"best", 8}, {"at_the_best_optimum", 4}};
+  multistart["waterfall"].push_back(Json{{"start", 8}, {"status", "iteration_limit"}});
+  CHECK(counted_starts(multistart) == "all 10 starts");
+  CHECK(starts_in_words(multistart) == "all 10 starts, seed 5: 4 at the best optimum");
+  multistart["finished"] = 3, multistart["at_the_best_optimum"] = 0;
+  CHECK(counted_starts(multistart) == "3 of 10 starts");
+  CHECK(starts_in_words(multistart) ==
+        "3 of 10 starts, seed 5: the best one has not converged to an optimum (iteration_limit)");
+  multistart["best"] = nullptr;
+  CHECK(starts_in_words(multistart) == "3 of 10 starts, seed 5: none could be evaluated");
+  CHECK(std::string(end_of_search("converged_beyond_limit")) == "optimum");
+  CHECK(std::string(end_of_search("iteration_limit")) == "best point");
+}

@@ -77,6 +77,24 @@ TEST_CASE("an equality of a true extreme is met to 1e-6", "[true_limits]") {
   CHECK(result.constraints[0].price == Approx(1).epsilon(1e-3));
 }
 
+// The price is small beside the objective. So multiplier times slack, the optimality condition, is below the tolerance
+// far inside the limit.
+TEST_CASE("a limit of a small price is used to the last, too, and is at its bound", "[true_limits]") {
+  Problem problem = swing({limit("maximum_of", "x", {}, 0.99)});
+  problem.objectives[0].parameters_only = f("30 + (a - 1)^2");
+  problem.design->optimizer.type = GENERATE(as<std::string>{}, "ipopt", "slsqp");
+  const DesignResult result = run_design(problem);
+  INFO(problem.design->optimizer.type << ": " << result.message << " a = " << result.variables[0].value);
+  CHECK(result.status == SolverStatus::converged);
+  const DesignConstraint& held = result.constraints[0];
+  CHECK(*held.true_value <= 0.99);
+  CHECK(*held.true_value == Approx(0.99).epsilon(1e-6));
+  CHECK(held.price == Approx(0.02).epsilon(1e-2));
+  CHECK(held.at_upper);
+  CHECK(result.is_at_boundary());
+  CHECK(result.warnings.empty());
+}
+
 TEST_CASE("a limit on an extreme that does not bind takes no further round and has no price", "[true_limits]") {
   const DesignResult result = run_design(swing({limit("maximum_of", "x", {}, 1.5)}));
   CHECK(result.status == SolverStatus::converged);
@@ -99,6 +117,7 @@ TEST_CASE("limits that cannot hold together are named, with what they are missed
   CHECK(result.conflicts[0].missed + result.conflicts[1].missed > 0.1);
   CHECK_THAT(result.message,
              Contains("in conflict: ") && Contains("maximum_of x <= 0.5") && Contains("peak_to_peak_of x >= 1.5"));
+  CHECK(result.warnings.empty());  // more sharpness would not help
 }
 
 TEST_CASE("a bound of a variable is named where it keeps a limit from holding", "[true_limits]") {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "optim/solver/optimality.hpp"
 #include "optim/solver/search_watch.hpp"
 #include "tests/optim/small_programs.hpp"
 
@@ -138,6 +139,33 @@ TEST_CASE("constraints that contradict each other are infeasible", "[ipopt]") {
   problem.c_lower(0) = 2000;  // the product of four numbers up to 5 is at most 625
   const NlpResult result = solve_with_ipopt(problem, vector({1, 5, 5, 1}), {1e-6, 1e-8, 300, 20, {}});
   CHECK(result.status == SolverStatus::infeasible);
+}
+
+// l <= 0.4 keeps both limits from holding. Their sum is least at k = 0.6, where the second one holds; their maximum is
+// least at k = 1.12, where the bound does not matter for the sum.
+TEST_CASE("an infeasible program ends where the sum of its violations is least, with the bound in conflict",
+          "[ipopt]") {
+  struct Corner : NonlinearProgram {
+    Corner() : NonlinearProgram(2, 2) {
+      x_lower.setZero(), x_upper << 5, 0.4;
+      c_upper(0) = -1, c_lower(1) = -1;
+    }
+    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+      const double k = x(0), l = x(1);
+      p.f = k * k, p.f_x << 2 * k, 0;
+      p.c << -(l + 0.5 * k) / 2, -(l + k);
+      p.c_x << -0.25, -0.5, -1, -1;
+    }
+  };
+  Corner problem;
+  const NlpResult result = solve_with_ipopt(problem, vector({2, 0.1}));
+  CHECK(result.status == SolverStatus::infeasible);
+  CHECK((result.x - vector({0.6, 0.4})).norm() < 1e-3);
+  const Conflict found = conflict(problem, result.x, result.point, 1e-8);
+  CHECK(found.of_constraints(0) == 1);
+  CHECK(found.of_constraints(1) == Approx(-0.25).epsilon(1e-6));
+  CHECK(found.of_bounds(1) == Approx(0.25).epsilon(1e-6));
+  CHECK(found.residual < 1e-6);
 }
 
 TEST_CASE("a start that is optimal already is left as it is", "[ipopt]") {
