@@ -81,7 +81,8 @@ def give_parameters(rng, family, problem):
             continue
         items, key, path = rng.choice(able)
         direction = any(str(part).startswith(("axis", "normal")) for part in path)
-        size = abs(items[key]) or (1.0 if direction else family.length)
+        beside = [abs(x) for x in items if isinstance(x, (int, float))] if isinstance(items, list) else [0]
+        size = abs(items[key]) or (1.0 if direction else max(beside, default=0) or family.length)
         items[key] = parameters.defined(parameters.express(items[key], size))
     if parameters.values and rng.random() < 0.15:
         name = rng.choice(list(parameters.values))
