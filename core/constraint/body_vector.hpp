@@ -40,7 +40,7 @@ struct VectorBlocks {
         xdd_pdot(2 * xd_p - 4 * (f.A * s) * b.pdot.transpose()) {}
 };
 
-// d = P2 - P1 of two body points. Its second derivative lacks the part of rddot', which tangents hold fixed.
+// d = P2 - P1 of two body points, and its tangent. The tangent of xdd has no part of rddot', which tangents hold fixed.
 inline VectorJet separation(const Frame& f1, const Frame& f2, const Vector3d& s1, const Vector3d& s2) {
   return {f2.point(s2) - f1.point(s1), f2.point_dot(s2) - f1.point_dot(s1), f2.point_ddot(s2) - f1.point_ddot(s1),
           f2.point_eta(s2) - f1.point_eta(s1)};

@@ -7,26 +7,12 @@
 
 #include <vector>
 
+#include "core/body/inertia.hpp"
 #include "core/body/planar_frame.hpp"
 #include "core/dynamics/planar_bodies.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 
 namespace mbsopt {
-
-// J' x of an inertia's directions J' (its rows xx yy zz xy xz yz).
-inline Lanes<3> inertia_tangent_times(const Lanes<6>& J, const Vector3d& x) {
-  Lanes<3> y;
-  y.row(0) = x(0) * J.row(0) + x(1) * J.row(3) + x(2) * J.row(4);
-  y.row(1) = x(0) * J.row(3) + x(1) * J.row(1) + x(2) * J.row(5);
-  y.row(2) = x(0) * J.row(4) + x(1) * J.row(5) + x(2) * J.row(2);
-  return y;
-}
-// The gradient of <X, J> in these six numbers.
-inline Vec<6> inertia_gradient(const Matrix3d& X) {
-  Vec<6> x;
-  x << X(0, 0), X(1, 1), X(2, 2), X(0, 1) + X(1, 0), X(0, 2) + X(2, 0), X(1, 2) + X(2, 1);
-  return x;
-}
 
 struct InSpace {
   static constexpr int kUnknowns = 6;

@@ -4,18 +4,13 @@
 #include <algorithm>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/body/inertia.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
-
-Vec<6> inertia_entries(const Matrix3d& X) {  // gradient in xx yy zz xy xz yz of <X, J>
-  Vec<6> x;
-  x << X(0, 0), X(1, 1), X(2, 2), X(0, 1) + X(1, 0), X(0, 2) + X(2, 0), X(1, 2) + X(2, 1);
-  return x;
-}
 
 void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, double scale, VecOut y_bar,
                           VecOut rho_bar) {
@@ -29,7 +24,7 @@ void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, doub
     y_bar.segment<4>(v + 3) += 2 * scale * G_transposed_times(b.state.p, w_bar);
     y_bar.segment<4>(q + 3) -= 2 * scale * G_transposed_times(b.state.pdot, w_bar);
     add_slot<1>(d, body.slot_mass, Vec<1>(0.5 * b.frame.rdot.squaredNorm()), scale, rho_bar);
-    add_slot<6>(d, body.slot_J, inertia_entries(0.5 * w * w.transpose()), scale, rho_bar);
+    add_slot<6>(d, body.slot_J, inertia_gradient(0.5 * w * w.transpose()), scale, rho_bar);
   }
 }
 

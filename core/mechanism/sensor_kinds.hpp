@@ -18,6 +18,7 @@ SensorMaker make_joint_angle, make_body_angle, make_displacement;  // joint_sens
 SensorMaker make_angular_velocity, make_orientation;               // rotation_sensors.cpp
 SensorMaker make_energy, make_violation, make_tension;             // energy_, violation_, tension_sensor.cpp
 SensorMaker make_mass_sum;                                         // mass_sensors.cpp
+SensorMaker make_angular_momentum;                                 // angular_momentum_sensor.cpp
 SensorMaker make_reaction, make_drive_force;                       // reaction_sensor.cpp
 SensorMaker make_imu;                                              // imu_sensor.cpp
 SensorMaker make_transmission_angle;                               // transmission_sensor.cpp
@@ -44,6 +45,7 @@ inline constexpr SensorMakerRow kSensorMakers[] = {
     {"energy", make_energy},
     {"centre_of_mass", make_mass_sum},
     {"momentum", make_mass_sum},
+    {"angular_momentum", make_angular_momentum},
     {"constraint_violation", make_violation},
     {"force", make_tension},
     {"reaction", make_reaction},

@@ -81,6 +81,8 @@ constexpr TypeRow kQuantities[] = {
     {"centre_of_mass", "common one of all bodies", "component!", "x y z norm", dimension::kLength},
     {"momentum", "linear, of all bodies together", "component!", "x y z norm", Dimension{{1, 1, -1, 0}},
      Reads::velocities, "kg m/s"},
+    {"angular_momentum", "of all bodies together about the global origin", "component!", "x y z norm",
+     Dimension{{2, 1, -1, 0}}, Reads::velocities, "kg m^2/s"},
     {"constraint_violation", "largest absolute entry of the constraint equations", "", "", {}, Reads::time_and_state},
     {"force", "tension of a tsda, torque of an rsda or torsion_bar", "force!", "", dimension::kForce,
      Reads::time_and_state, "N or N m"},

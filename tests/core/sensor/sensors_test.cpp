@@ -113,15 +113,25 @@ struct TextbookScene {
     const double turn = 2 * std::acos(-1.0);
     return principal + turn * std::round((kTurns * turn - std::real(principal)) / turn);
   }
+  T mass_of(std::size_t i) const { return i == 0 ? rho[m1] : T(1); }
+  V3<T> rdot(std::size_t i) const { return {body(i).v[0], body(i).v[1], body(i).v[2]}; }
+  V3<T> J_omega(std::size_t i) const {  // body axes
+    const T xy = i == 1 ? rho[j] : T(0.01);
+    const M3<T> J{V3<T>{T(0.2), xy, T(0.02)}, V3<T>{xy, T(0.3), T(0.03)}, V3<T>{T(0.02), T(0.03), T(0.4)}};
+    return times(J, omega(i, true));
+  }
   T kinetic() const {
     T sum(0);
     for (std::size_t i = 0; i < 2; ++i) {
-      const T m = i == 0 ? rho[m1] : T(1);
-      const T xy = i == 1 ? rho[j] : T(0.01);
-      const M3<T> J{V3<T>{T(0.2), xy, T(0.02)}, V3<T>{xy, T(0.3), T(0.03)}, V3<T>{T(0.02), T(0.03), T(0.4)}};
-      const auto v = body(i).v;
-      const V3<T> rdot{v[0], v[1], v[2]}, w = omega(i, true);
-      sum += T(0.5) * (m * dot(rdot, rdot) + dot(w, times(J, w)));
+      sum += T(0.5) * (mass_of(i) * dot(rdot(i), rdot(i)) + dot(omega(i, true), J_omega(i)));
+    }
+    return sum;
+  }
+  V3<T> angular_momentum() const {
+    V3<T> sum{};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto f = body(i).frame();
+      sum = sum + scaled(mass_of(i), cross(f.r, rdot(i))) + times(f.A, J_omega(i));
     }
     return sum;
   }
@@ -137,7 +147,7 @@ struct TextbookScene {
     T sum(0);
     for (std::size_t i = 0; i < 2; ++i) {
       const auto q = body(i).q;
-      sum -= (i == 0 ? rho[m1] : T(1)) * dot(gravity, V3<T>{q[0], q[1], q[2]});
+      sum -= mass_of(i) * dot(gravity, V3<T>{q[0], q[1], q[2]});
     }
     const auto d = point(1, {rho[b], T(0), T(0.2)}) - point(0, {T(0), rho[a], T(0)});
     const T stretch = norm(values(d)) - rho[l0], twist = angle() - rho[theta0];
@@ -345,6 +355,9 @@ const std::vector<Row>& all_sensors() {
           [](const auto& s) { return s.mass_sum(1)[2] / s.mass(); }, true),
       row("momentum", plain("momentum", "y"), [](const auto& s) { return s.mass_sum(1)[1]; }),
       row("momentum, norm", plain("momentum", "norm"), [](const auto& s) { return norm(s.mass_sum(1)); }),
+      row("angular_momentum", plain("angular_momentum", "y"), [](const auto& s) { return s.angular_momentum()[1]; }),
+      row("angular_momentum, norm", plain("angular_momentum", "norm"),
+          [](const auto& s) { return norm(s.angular_momentum()); }),
       row("constraint_violation", plain("constraint_violation"), [](const auto& s) { return s.violation(); }),
       row("transmission_angle", plain("transmission_angle"), [](const auto& s) { return s.transmission_angle(); }),
       row("imu, rate", mounted("wy"), MountRate()),

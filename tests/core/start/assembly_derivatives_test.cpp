@@ -131,6 +131,14 @@ TEST_CASE("derivatives of the assembled state: spatial loop, every kind of field
     scene.conditions.push_back(value_of("speed", "v0"));
     scene.conditions.push_back(value_of("spin_rate", "2*spin"));
   }
+  SECTION("angular momentum, a component and its norm") {
+    for (const char* component : {"x", "norm"}) {
+      Sensor s;
+      s.name = std::string("L") + component, s.quantity = "angular_momentum", s.component = component;
+      scene.sensors.push_back(s);
+      scene.conditions.push_back(value_of(s.name, s.component == "x" ? "spin" : "2*v0"));
+    }
+  }
   SECTION("distance rate and angle rate as velocities of their own") {
     Sensor s;
     s.name = "closing", s.quantity = "distance_rate", s.body1 = "ground", s.body2 = "coupler";
