@@ -22,7 +22,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kMassless = 1e-12;           // relative to the largest mass or inertia
+constexpr double kMassless = 1e-12;           // of an inertia about a principal axis, relative to the body's trace
 constexpr double kZeroLength = 1e-9;          // [m]
 constexpr double kMuchViolated = 0.1;         // of the mechanism's size for points, rad for axes
 constexpr double kModelRankThreshold = 1e-8;  // rows of J scaled to unit length
@@ -50,19 +50,15 @@ void add_jacobian(const MechanismData& d, const VectorXd& q, std::vector<SparseE
 // Directions that neither a joint nor a mass holds: no row of J and no row of the masses, one per principal axis,
 // reaches them. For each body: whether it may turn, or only move.
 std::map<int, bool> massless_directions(const MechanismData& d, const VectorXd& q) {
-  double mass = 0, inertia = 0;
-  for (int i = 1; i <= d.n; ++i) {
-    mass = std::max(mass, d.bodies[at(i)].mass), inertia = std::max(inertia, d.bodies[at(i)].J.trace());
-  }
   std::vector<SparseEntry> rows;
   int count = d.m;
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& b = d.bodies[at(i)];
     const int first = 6 * (i - 1);
-    for (int k = 0; k < 3 && b.mass > kMassless * mass; ++k) rows.push_back({count++, first + k, 1});
+    for (int k = 0; k < 3 && b.mass > 0; ++k) rows.push_back({count++, first + k, 1});
     const SymmetricEigen principal = symmetric_eigen(b.J);
     for (int k = 0; k < 3; ++k) {
-      if (!(principal.values(k) > kMassless * inertia)) continue;
+      if (!(principal.values(k) > kMassless * b.J.trace())) continue;
       for (int j = 0; j < 3; ++j) rows.push_back({count, first + 3 + j, principal.vectors(j, k)});
       ++count;
     }

@@ -203,6 +203,7 @@ void describe_solution(DesignProgram& program, const VariableScaling& scaling, c
   const Eigen::VectorXd& x = rounds.solution.x;
   result.final_evaluation = program.evaluation(result.rho);
   describe_objective(program, rounds.true_values, result);
+  result.true_violation = 0;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
     c.true_value = rounds.true_values[static_cast<std::size_t>(program.psi_of(static_cast<Eigen::Index>(i)))];
