@@ -1,4 +1,4 @@
-// What the columns of an identification hold, before anything is fitted. Windows of one experiment are one record.
+// Says what the columns of an identification hold before the fit. Windows of one experiment are one record.
 //
 //   std::vector<ChannelData> channels = channel_data(problem, data);   // problem: cut into windows, data: of these
 //   add_residuals(channels, start);                                    // start: residuals_at_start, or a preflight

@@ -93,7 +93,7 @@ Json task_json(const Tradeoff& tradeoff, const TaskAdvice& advice, const Recomme
   return json;
 }
 
-// What may make a reference uncertain.
+// Says what may make a reference uncertain.
 std::string doubt(const Quantity& q, const std::vector<ObjectiveSpec>& objectives) {
   const std::string any = "a chaotic motion, or a law that is not smooth?";
   const auto spec = std::ranges::find(objectives, q.objective_name, &ObjectiveSpec::name);

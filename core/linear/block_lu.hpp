@@ -58,7 +58,7 @@ class BlockLu {
 
   double* block(std::size_t k) { return values_.data() + k * size_; }
   const double* block(std::size_t k) const { return values_.data() + k * size_; }
-  // Of the diagonal block at an elimination position.
+  // k is the elimination position of a diagonal block.
   double* inverse_of(std::size_t k) { return inverse_.data() + k * static_cast<std::size_t>(rows_); }
   const double* inverse_of(std::size_t k) const { return inverse_.data() + k * static_cast<std::size_t>(rows_); }
   int* exchanged_of(std::size_t k) { return exchanged_.data() + k * static_cast<std::size_t>(rows_); }
