@@ -7,8 +7,11 @@
 #include <limits>
 #include <map>
 
+#include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/dynamics/constraint_rows.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 #include "core/force/forces.hpp"
 #include "core/linear/dense.hpp"
 #include "core/linear/row_dependence.hpp"
@@ -93,30 +96,51 @@ void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::str
   }
 }
 
-// Derivatives of a reaction's components in lambda, one column each. A norm has those in the plane of a mechanism,
-// since nothing in the plane loads the others.
-Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const VectorXd& y) {
-  std::vector<int> components{sensor.component};
-  if (sensor.component == SensorFunction::kNorm) {
-    components.clear();
-    for (int k = 0; k < 3; ++k)
-      if (!d.planar || (k == d.planar->n) == sensor.torque) components.push_back(k);
+// The multipliers where all bodies of a planar mechanism spin at 1 rad/s. They show whether products of inertia, forces
+// or points at several heights load joints out of the plane.
+VectorXd multipliers_of_spin(const Mechanism& mechanism, const AssemblyResult& start) {
+  const MechanismData& d = mechanism.data();
+  const StateLayout layout{d.n};
+  VectorXd y = start.y, ydot(y.size());
+  y.tail(layout.positions()).setZero();
+  for (int i = 1; i <= d.n; ++i) {
+    const Vector4d p = y.segment<4>(layout.p(i));
+    y.segment<4>(layout.pdot(i)) = 0.5 * G_transposed_times(p, A(p).transpose() * Vector3d::Unit(d.planar->n));
   }
-  Eigen::MatrixXd columns(d.m, static_cast<Eigen::Index>(components.size()));
+  SpatialDynamics dynamics(mechanism, {});
+  dynamics.evaluate(0, y, start.angles, ydot);
+  return dynamics.lambda();
+}
+
+// Derivatives of a reaction's components in lambda, one column each. A norm in a planar mechanism has those in the
+// plane, and the others only if something loads them: lambda of multipliers_of_spin().
+Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const VectorXd& y, const VectorXd& lambda) {
+  constexpr double kRounding = 1e-9;  // of the largest multiplier
+  const bool norm = sensor.component == SensorFunction::kNorm;
   const VectorXd none = VectorXd::Zero(d.m);
-  VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(d.rho.size()), lambda_bar;
-  for (std::size_t k = 0; k < components.size(); ++k) {
-    sensor.component = components[k];
-    lambda_bar = none;
-    sensor.add_gradient(d, y, none, 1, y_bar, lambda_bar, rho_bar);
-    columns.col(static_cast<Eigen::Index>(k)) = lambda_bar;
+  VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(d.rho.size());
+  Eigen::MatrixXd columns(d.m, 0);
+  for (int k = 0; k < 3; ++k) {
+    if (!norm && k != sensor.component) continue;
+    ReactionSensor part = sensor;
+    part.component = k;
+    VectorXd b = none;
+    part.add_gradient(d, y, none, 1, y_bar, b, rho_bar);
+    const bool in_plane = !d.planar || (k == d.planar->n) == sensor.torque;
+    const double all = b.lpNorm<Eigen::Infinity>() * lambda.lpNorm<Eigen::Infinity>();
+    if (norm && !in_plane && std::abs(b.dot(lambda)) <= kRounding * all) continue;
+    columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);
+    columns.rightCols(1) = b;
   }
   return columns;
 }
 
 // The motion determines J'lambda. It determines b'lambda if b = J u for some u, that is, if b as a further column does
 // not raise the rank of J.
-void add_reactions(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
+void add_reactions(const Mechanism& mechanism, const AssemblyResult& start, std::vector<std::string>& warnings) {
+  const MechanismData& d = mechanism.data();
+  const VectorXd& y = start.y;
+  VectorXd of_spin = VectorXd::Zero(d.m);
   std::vector<SparseEntry> rows;
   int rank = -1;
   std::map<std::string, bool> told;
@@ -128,8 +152,10 @@ void add_reactions(const MechanismData& d, const VectorXd& y, std::vector<std::s
       rank = row_dependence(d.m, d.n, 6, rows, kModelRankThreshold).rank;
     }
     if (rank == d.m) return;
+    if (d.planar && sensor->component == SensorFunction::kNorm && of_spin.isZero(0))
+      of_spin = multipliers_of_spin(mechanism, start);
     std::vector<SparseEntry> extended = rows;
-    const Eigen::MatrixXd b = by_lambda(d, *sensor, y);
+    const Eigen::MatrixXd b = by_lambda(d, *sensor, y, of_spin);
     for (Eigen::Index k = 0; k < b.cols(); ++k)
       for (int r = 0; r < d.m; ++r)
         if (b(r, k) != 0) extended.push_back({r, 6 * d.n + static_cast<int>(k), b(r, k)});
@@ -273,7 +299,7 @@ std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assemb
   add_rounding(d, assembly.result().y.head(7 * d.n), warnings);
   add_massless(d, assembly.result().y.head(7 * d.n), warnings);
   add_springs(d, assembly.result().y, warnings);
-  add_reactions(d, assembly.result().y, warnings);
+  add_reactions(mechanism, assembly.result(), warnings);
   return warnings;
 }
 

@@ -54,10 +54,11 @@ TEST_CASE("a mechanism so far from the origin that rounding spoils its lengths i
 // Three spatial hinges of a planar loop share what holds the bars in their plane in ways that J'lambda leaves open. In
 // the plane there is but one way.
 TEST_CASE("a reaction that redundant equations leave undetermined is warned of, and no other", "[warnings]") {
-  const auto of = [](const std::string& kind, const std::string& component) {
+  const auto of = [](const std::string& kind, const std::string& component, double height = 0, double product = 0) {
     Scene scene = four_bar();
     scene.gravity = {0.0, -9.81, 0.0};
-    for (Body& b : scene.bodies) b.position[2] = 0.0;
+    for (Body& b : scene.bodies) b.position[2] = 0.0, b.inertia.xz = 0.0, b.inertia.yz = 0.0;
+    scene.bodies[1].com[2] = height, scene.bodies[1].inertia.xz = product;
     Sensor s;
     s.name = "reaction", s.quantity = "reaction", s.joint = "B", s.kind = kind, s.component = component;
     scene.sensors.push_back(s);
@@ -74,6 +75,8 @@ TEST_CASE("a reaction that redundant equations leave undetermined is warned of, 
   CHECK(found[0].find("the reaction force in joint 'B' is not determined") == 0);
   CHECK(of("force", "norm").empty());  // of the forces in the plane
   CHECK(of("torque", "norm").empty());
+  CHECK(of("force", "norm", 0.1).size() == 1);  // a centre of mass out of the plane of the points
+  CHECK(of("torque", "norm", 0, 0.01).size() == 1);
   CHECK(of("torque", "x").size() == 1);
 }
 
