@@ -30,22 +30,6 @@ Program compiled(const Field& field, const Symbols& symbols, const std::string& 
   }
 }
 
-// Value of a field of a channel, with its gradient in all parameters and t.
-struct Differentiated {
-  double value = 0;
-  Eigen::VectorXd rho_bar;
-};
-
-Differentiated evaluated(const Program& program, const Eigen::VectorXd& rho, double t, Program::Scratch& scratch) {
-  Differentiated d;
-  std::vector<double> inputs(rho.begin(), rho.end());
-  inputs.push_back(t);
-  d.rho_bar.setZero(rho.size() + 1);
-  program.grow(scratch);
-  d.value = program.add_gradient(inputs, 1, std::span(d.rho_bar.data(), inputs.size()), scratch);
-  return d;
-}
-
 // Whether time acts on the scene other than through its state.
 bool depends_on_time(const Scene& scene) {
   bool found = !scene.drives.empty() || !scene.signals.empty();
@@ -61,6 +45,17 @@ bool depends_on_time(const Scene& scene) {
 }
 
 }  // namespace
+
+Experiment::Differentiated Experiment::evaluated(const Program& program, const Eigen::VectorXd& rho, double t,
+                                                 Program::Scratch& scratch) {
+  Differentiated d;
+  std::vector<double> inputs(rho.begin(), rho.end());
+  inputs.push_back(t);
+  d.rho_bar.setZero(rho.size() + 1);
+  program.grow(scratch);
+  d.value = program.add_gradient(inputs, 1, std::span(d.rho_bar.data(), inputs.size()), scratch);
+  return d;
+}
 
 Experiment::Experiment(const Scene& scene, const ExperimentSpec& spec, std::string place, const CsvTable& data,
                        const Eigen::VectorXd& rho, std::vector<Unknown> unknowns,
@@ -272,120 +267,151 @@ void Experiment::refuse_short_laws(const ExperimentSpec& spec, const std::string
                                           path, found->words, spec.name, found->of_signal ? "samples" : "a law"));
 }
 
-Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limits& limits) const {
-  Residuals r;
-  const Eigen::Index N = static_cast<Eigen::Index>(samples_.size());
-  r.z.setZero(N), r.z_u.setZero(N, u.size());
-  Eigen::VectorXd rho = rho_;
-  for (const Unknown& unknown : unknowns_) rho(unknown.parameter) = u(unknown.at);
+// One run at given unknowns, and the residuals that are read along it.
+class Experiment::Reading {
+ public:
+  Reading(const Experiment& experiment, const Eigen::VectorXd& u, const Limits& limits)
+      : of_(experiment), limits_(limits), settings_(experiment.settings_), rho_(experiment.rho_), unknowns_(u.size()) {
+    for (const Unknown& unknown : of_.unknowns_) rho_(unknown.parameter) = u(unknown.at);
+    r_.z.setZero(static_cast<Eigen::Index>(of_.samples_.size())), r_.z_u.setZero(r_.z.size(), u.size());
+    for (const Channel& c : of_.channels_) now_.push_back(at_time(c, settings_.start_time));
+    if (limits.max_steps) settings_.integrator.max_steps = std::min(settings_.integrator.max_steps, *limits.max_steps);
+  }
 
+  Residuals residuals() {
+    r_.message = set_times();
+    if (!r_.message.empty()) return std::move(r_);
+    if (const auto found = of_.short_samples(rho_, settings_.end_time)) {
+      r_.message =
+          fmt::format("the motion until {:.6g} s is beyond the samples of the {} '{}': {}", settings_.end_time,
+                      found->of_signal ? "signal" : "drive",
+                      found->of_signal ? of_.scene_.signals[found->index].name : of_.scene_.drives[found->index].name,
+                      found->words);
+      return std::move(r_);
+    }
+    try {
+      run();
+    } catch (const SceneError& error) {  // a field that these values drive out of its range
+      r_.message = error.what();
+    }
+    return std::move(r_);
+  }
+
+ private:
   struct ChannelNow {
     Differentiated gain, bias, delay;
   };
-  Program::Scratch scratch;
-  const auto at_time = [&](const Channel& c, double t) {
-    return ChannelNow{evaluated(c.gain, rho, t, scratch), evaluated(c.bias, rho, t, scratch),
-                      evaluated(c.delay, rho, t, scratch)};
-  };
-  const int time = static_cast<int>(rho.size());
-  std::vector<ChannelNow> now;
-  for (const Channel& c : channels_) now.push_back(at_time(c, settings_.start_time));
-  const auto of_sample = [&](const Sample& sample) -> const ChannelNow& {
-    const Channel& c = channels_[sample.channel];
-    ChannelNow& values = now[sample.channel];
-    if (c.bias.uses(time) || c.delay.uses(time)) values = at_time(c, times_[sample.time]);
-    return values;
-  };
-
-  SimulationSettings settings = settings_;
-  if (limits.max_steps) settings.integrator.max_steps = std::min(settings.integrator.max_steps, *limits.max_steps);
-  TangentSampling sampling;
-  if (!delayed_)
-    sampling.times = times_;
-  else
-    for (const Sample& sample : samples_) {  // each at a time of its own
-      const double t = times_[sample.time] - of_sample(sample).delay.value;
-      if (!std::isfinite(t)) {
-        r.message = fmt::format("the delay of channel {} is not finite", sample.channel);
-        return r;
-      }
-      sampling.times.push_back(std::max(t, settings.start_time));
-      settings.end_time = std::max(settings.end_time, t);
-    }
-
-  const std::size_t readings = sampling.times.size();  // those of the samples; then the ends
-  if (start_chart_ && limits.derivatives) sampling.times.push_back(settings.start_time);
-  if (end_chart_ && limits.derivatives) sampling.times.push_back(settings_.end_time);
-
-  if (const auto found = short_samples(rho, settings.end_time)) {
-    r.message = fmt::format("the motion until {:.6g} s is beyond the samples of the {} '{}': {}", settings.end_time,
-                            found->of_signal ? "signal" : "drive",
-                            found->of_signal ? scene_.signals[found->index].name : scene_.drives[found->index].name,
-                            found->words);
-    return r;
+  ChannelNow at_time(const Channel& c, double t) {
+    return {evaluated(c.gain, rho_, t, scratch_), evaluated(c.bias, rho_, t, scratch_),
+            evaluated(c.delay, rho_, t, scratch_)};
   }
-  try {
-    const std::vector<bool> none(active_.size(), false);
-    const Mechanism mechanism(scene_, rho, limits.derivatives ? active_ : none, user_forces_, programs_);
-    Eigen::VectorXd y_bar(mechanism.states()), rho_bar(rho.size());
-    std::size_t seen = 0;
-    const auto set_residual = [&](std::size_t i, const ChannelNow& c, double s) {
-      const Sample& sample = samples_[i];
-      r.z(static_cast<Eigen::Index>(i)) =
-          (sample.measured - c.gain.value * s - c.bias.value) / channels_[sample.channel].sigma;
-      ++seen;
-    };
-    const auto take = [&](std::size_t i, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
-      const Sample& sample = samples_[i];
-      const ChannelNow& c = of_sample(sample);
-      y_bar.setZero(), rho_bar.setZero();
-      const double s = mechanism.add_sensor_gradient(channels_[sample.channel].sensor, at, 1, y_bar, rho_bar);
-      const bool held = times_[sample.time] - c.delay.value < settings.start_time;
-      const double sdot = delayed_ && !held && !unknowns_.empty() ? y_bar.dot(*at.ydot) : 0.0;
-      set_residual(i, c, s);
-      for (const Unknown& unknown : unknowns_) {
-        const int k = unknown.parameter;
-        const double s_u = y_bar.dot(y_rho.col(k)) - sdot * c.delay.rho_bar(k) + rho_bar(k);
-        r.z_u(static_cast<Eigen::Index>(i), unknown.at) =
-            -(c.gain.value * s_u + s * c.gain.rho_bar(k) + c.bias.rho_bar(k)) / channels_[sample.channel].sigma;
-      }
-    };
-    // f(sample) of those that are read at a time of the run.
-    const auto for_samples_at = [&](std::size_t k, auto&& f) {
-      if (delayed_) return f(k);
-      for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) f(i);
-    };
-    const auto take_end = [&](const StateChart& chart, const StatePoint& at, const Eigen::MatrixXd& y_rho,
-                              Eigen::VectorXd& s, Eigen::MatrixXd& s_u) {
-      Eigen::MatrixXd s_rho;
-      chart.read(at.y, y_rho, s, s_rho);
-      s_u.setZero(s.size(), u.size());
-      for (const Unknown& unknown : unknowns_) s_u.col(unknown.at) = s_rho.col(unknown.parameter);
-    };
-    sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
-      if (k == readings && start_chart_) return take_end(*start_chart_, at, y_rho, r.start, r.start_u);
-      if (k >= readings) return take_end(*end_chart_, at, y_rho, r.end, r.end_u);
-      for_samples_at(k, [&](std::size_t i) { take(i, at, y_rho); });
-    };
-    RunOptions options;
-    options.progress = limits.progress, options.exact_stages = true;
+  const ChannelNow& of_sample(const Sample& sample) {
+    const Channel& c = of_.channels_[sample.channel];
+    const int time = static_cast<int>(rho_.size());
+    ChannelNow& values = now_[sample.channel];
+    if (c.bias.uses(time) || c.delay.uses(time)) values = at_time(c, of_.times_[sample.time]);
+    return values;
+  }
+
+  // The times at which the run is read: those of the measurements, or with a delay one per sample; then those of its
+  // ends, whose states are read, too. Returns why it cannot be.
+  std::string set_times() {
+    if (!of_.delayed_) times_ = of_.times_;
+    for (const Sample& sample : of_.samples_) {
+      if (!of_.delayed_) break;
+      const double t = of_.times_[sample.time] - of_sample(sample).delay.value;
+      if (!std::isfinite(t)) return fmt::format("the delay of channel {} is not finite", sample.channel);
+      times_.push_back(std::max(t, settings_.start_time));
+      settings_.end_time = std::max(settings_.end_time, t);
+    }
+    readings_ = times_.size();
+    if (of_.start_chart_ && limits_.derivatives) times_.push_back(settings_.start_time);
+    if (of_.end_chart_ && limits_.derivatives) times_.push_back(of_.settings_.end_time);
+    return {};
+  }
+
+  void run() {
+    const std::vector<bool> none(of_.active_.size(), false);
+    const Mechanism mechanism(of_.scene_, rho_, limits_.derivatives ? of_.active_ : none, of_.user_forces_,
+                              of_.programs_);
+    y_bar_.resize(mechanism.states()), rho_bar_.resize(rho_.size());
+    TangentSampling sampling;
     Sampling values;
-    if (!limits.derivatives) values.times = std::move(sampling.times);
+    (limits_.derivatives ? sampling.times : values.times) = times_;
+    sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
+      if (k == readings_ && of_.start_chart_) return take_end(*of_.start_chart_, at, y_rho, r_.start, r_.start_u);
+      if (k >= readings_) return take_end(*of_.end_chart_, at, y_rho, r_.end, r_.end_u);
+      for_samples_at(k, [&](std::size_t i) { take(mechanism, i, at, y_rho); });
+    };
     values.observe = [&](std::size_t k, const StatePoint& at) {
       for_samples_at(k, [&](std::size_t i) {
-        const Sample& sample = samples_[i];
-        set_residual(i, of_sample(sample), mechanism.sensor_value(channels_[sample.channel].sensor, at));
+        const Sample& sample = of_.samples_[i];
+        set_residual(i, of_sample(sample), mechanism.sensor_value(of_.channels_[sample.channel].sensor, at));
       });
     };
-    const SimulationResult result = limits.derivatives ? simulate_tlm(mechanism, settings, {}, sampling, options)
-                                                       : simulate(mechanism, settings, {}, values, options);
-    r.steps = result.statistics.steps, r.jumps = result.statistics.jumps;
-    r.ok = result.ok() && seen == samples_.size();
-    r.message = result.message;
-  } catch (const SceneError& error) {  // a field that these values drive out of its range
-    r.message = error.what();
+    RunOptions options;
+    options.progress = limits_.progress, options.exact_stages = true;
+    const SimulationResult result = limits_.derivatives ? simulate_tlm(mechanism, settings_, {}, sampling, options)
+                                                        : simulate(mechanism, settings_, {}, values, options);
+    r_.steps = result.statistics.steps, r_.jumps = result.statistics.jumps;
+    r_.ok = result.ok() && seen_ == of_.samples_.size();
+    r_.message = result.message;
   }
-  return r;
+
+  // Calls f(sample) of those that are read at a time of the run.
+  template <class F>
+  void for_samples_at(std::size_t k, F&& f) const {
+    if (of_.delayed_) return f(k);
+    for (std::size_t i = of_.first_[k]; i < of_.first_[k + 1]; ++i) f(i);
+  }
+
+  void set_residual(std::size_t i, const ChannelNow& c, double s) {
+    const Sample& sample = of_.samples_[i];
+    r_.z(static_cast<Eigen::Index>(i)) =
+        (sample.measured - c.gain.value * s - c.bias.value) / of_.channels_[sample.channel].sigma;
+    ++seen_;
+  }
+
+  void take(const Mechanism& mechanism, std::size_t i, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
+    const Sample& sample = of_.samples_[i];
+    const Channel& channel = of_.channels_[sample.channel];
+    const ChannelNow& c = of_sample(sample);
+    y_bar_.setZero(), rho_bar_.setZero();
+    const double s = mechanism.add_sensor_gradient(channel.sensor, at, 1, y_bar_, rho_bar_);
+    const bool held = of_.times_[sample.time] - c.delay.value < settings_.start_time;
+    const double sdot = of_.delayed_ && !held && !of_.unknowns_.empty() ? y_bar_.dot(*at.ydot) : 0.0;
+    set_residual(i, c, s);
+    for (const Unknown& unknown : of_.unknowns_) {
+      const int k = unknown.parameter;
+      const double s_u = y_bar_.dot(y_rho.col(k)) - sdot * c.delay.rho_bar(k) + rho_bar_(k);
+      r_.z_u(static_cast<Eigen::Index>(i), unknown.at) =
+          -(c.gain.value * s_u + s * c.gain.rho_bar(k) + c.bias.rho_bar(k)) / channel.sigma;
+    }
+  }
+
+  void take_end(const StateChart& chart, const StatePoint& at, const Eigen::MatrixXd& y_rho, Eigen::VectorXd& s,
+                Eigen::MatrixXd& s_u) const {
+    Eigen::MatrixXd s_rho;
+    chart.read(at.y, y_rho, s, s_rho);
+    s_u.setZero(s.size(), unknowns_);
+    for (const Unknown& unknown : of_.unknowns_) s_u.col(unknown.at) = s_rho.col(unknown.parameter);
+  }
+
+  const Experiment& of_;
+  const Limits& limits_;
+  SimulationSettings settings_;
+  Eigen::VectorXd rho_;
+  const Eigen::Index unknowns_;  // of the whole fit
+  Program::Scratch scratch_;
+  std::vector<ChannelNow> now_;  // values of the channels at the sample that is read
+  std::vector<double> times_;
+  std::size_t readings_ = 0, seen_ = 0;  // times of samples; samples read
+  Eigen::VectorXd y_bar_, rho_bar_;
+  Residuals r_;
+};
+
+Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limits& limits) const {
+  return Reading(*this, u, limits).residuals();
 }
 
 }  // namespace mbsopt

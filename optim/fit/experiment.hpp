@@ -97,6 +97,14 @@ class Experiment {
     double first = 0;  // samples before are left out [s]
     std::size_t missing = 0;
   };
+  class Reading;  // of one run
+  // Value of a field of a channel, with its gradient in all parameters and t.
+  struct Differentiated {
+    double value = 0;
+    Eigen::VectorXd rho_bar;
+  };
+  static Differentiated evaluated(const Program& program, const Eigen::VectorXd& rho, double t,
+                                  Program::Scratch& scratch);
   void replace_laws(const ExperimentSpec& spec, const std::string& place);
   void compile_channels(const ExperimentSpec& spec, const std::string& place);
   // The largest delay at any of the times that the bounds of the unknowns allow, where they say; else at their start

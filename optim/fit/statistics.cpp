@@ -86,13 +86,109 @@ MatrixXd inverse_without(const MatrixXd& V, const std::vector<Index>& held) {
   return free * free.transpose();
 }
 
+// The columns of J and their lengths. Columns of no effect are left out, unless equations tie their parameters to
+// others.
+struct Columns {
+  std::vector<Index> used, unseen;
+  VectorXd length;  // of all columns; a tied one of no effect is as long as the largest effect makes it
+};
+
+Columns columns_of(const FitData& data, const MatrixXd& J, const VectorXd& size) {
+  Columns columns{{}, {}, J.colwise().norm().transpose()};
+  const VectorXd& change = data.change.size() == size.size() ? data.change : size;
+  const double most_seen = columns.length.cwiseProduct(change.cwiseAbs()).maxCoeff();
+  for (Index k = 0; k < size.size(); ++k) {
+    const double seen = columns.length(k) * std::abs(change(k));
+    const bool tied = data.C.rows() > 0 && !data.C.col(k).isZero(0) && change(k) != 0 && most_seen > 0;
+    if (seen > 0 && seen > kNoInfluence * data.record) {
+      columns.used.push_back(k);
+    } else if (tied) {  // the equations may determine it by what others show
+      columns.used.push_back(k), columns.length(k) = most_seen / std::abs(change(k));
+    } else {
+      columns.unseen.push_back(k);
+    }
+  }
+  return columns;
+}
+
+// The right singular vectors and values of J in the used columns, scaled to unit length, within C d rho = 0.
+struct Directions {
+  MatrixXd vectors;  // used x F
+  VectorXd sigma;    // F, descending
+  Index rank;
+  MatrixXd over_sigma() const { return vectors.leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal(); }
+};
+
+Directions directions_of(const FitData& data, const MatrixXd& scaled, const Columns& columns) {
+  const Index U = scaled.cols();
+  const MatrixXd Z =
+      data.C.rows() > 0
+          ? null_space_of(data.C(Eigen::all, columns.used) * columns.length(columns.used).cwiseInverse().asDiagonal())
+          : MatrixXd::Identity(U, U);
+  // Singular values of the triangular factor, which is as small as the number of parameters.
+  MatrixXd triangle = scaled * Z;
+  if (scaled.rows() > Z.cols()) triangle = triangular_factor(std::move(triangle));
+  const RightSingular svd = right_singular(triangle);
+  VectorXd sigma = VectorXd::Zero(Z.cols());
+  sigma.head(svd.values.size()) = svd.values;
+  const Index rank = (sigma.array() > std::max(kRankTolerance, data.accuracy) * sigma(0)).count();
+  return {Z * svd.V, sigma, rank};
+}
+
+// The sandwich of the used columns. V V' = (scaled'scaled)^-1 of the determined directions.
+MatrixXd sandwich_covariance(const FitData& data, const ScoreVariance& scores_vary, const MatrixXd& scaled,
+                             const MatrixXd& V, const std::vector<Index>& used, double variance) {
+  const Index N = data.J.rows(), R = data.J_prior.rows(), U = scaled.cols();
+  const auto is_set = [&](const std::vector<bool>& marks, Index a) {
+    return !marks.empty() && marks[static_cast<std::size_t>(used[static_cast<std::size_t>(a)])];
+  };
+  const MatrixXd q = scaled * V, inverse = V * V.transpose(), a_J = scaled.topRows(N) * inverse;
+  const VectorXd z = influences(data);
+  const MatrixXd scores = scores_of(z, scaled.topRows(N));
+  const MatrixXd within = inverse * scores_vary.within(scores) * inverse;
+  VectorXd left_out;
+  if (scores_vary.has_windows()) {
+    std::vector<Index> held;
+    for (Index a = 0; a < U; ++a)
+      if (is_set(data.at_bound, a)) held.push_back(a);
+    left_out = scores_vary.left_out(z, scaled.topRows(N), inverse_without(V, held));
+  }
+  VectorXd larger = VectorXd::Ones(U);  // standard errors than those of `within`
+  for (Index a = 0; a < U; ++a) {
+    const bool alone = is_set(data.of_one_record, a), by_windows = !alone && scores_vary.has_windows();
+    VectorXd of_a = scores * inverse.col(a);
+    if (by_windows) of_a += a_J.col(a).cwiseProduct(left_out - z);
+    const double kept = by_windows ? 1 : scores_vary.kept(a_J.col(a), q.topRows(N), alone);
+    const double variance_a =
+        (scores_vary.is_between(alone) ? scores_vary.between(of_a) : scores_vary.within(of_a))(0, 0) / kept;
+    if (within(a, a) > 0) larger(a) = std::sqrt(variance_a / within(a, a));
+  }
+  MatrixXd covariance = larger.asDiagonal() * within * larger.asDiagonal();
+  if (R > 0) {  // v^2 J_prior'J_prior, which the scaled rows have v times
+    const MatrixXd prior = std::sqrt(variance) * scaled.bottomRows(R) * inverse;
+    covariance += prior.transpose() * prior;
+  }
+  return covariance;
+}
+
+// From the covariance of the used columns, of unit length, and from what it is for white residuals.
+void set_covariance(FitStatistics& s, const Columns& columns, const MatrixXd& covariance, const MatrixXd& white) {
+  for (Index a = 0; a < covariance.rows(); ++a)
+    for (Index b = 0; b < covariance.cols(); ++b) {
+      const Index ka = columns.used[static_cast<std::size_t>(a)], kb = columns.used[static_cast<std::size_t>(b)];
+      s.covariance(ka, kb) = covariance(a, b) / (columns.length(ka) * columns.length(kb));
+      if (a == b && white(a, a) > 0) s.inflation(ka) = covariance(a, a) / white(a, a);
+      const double norm = std::sqrt(covariance(a, a) * covariance(b, b));
+      if (a != b) s.correlation(ka, kb) = norm > 0 ? covariance(a, b) / norm : 0;
+    }
+}
+
 }  // namespace
 
 FitStatistics fit_statistics(const FitData& data) {
-  const Index N = data.J.rows(), R = data.J_prior.rows(), P = data.rho.size(), M = data.C.rows();
-  const VectorXd& rho = data.rho;
+  const Index N = data.J.rows(), R = data.J_prior.rows(), P = data.rho.size();
   FitStatistics s;
-  s.degrees_of_freedom = static_cast<long>(N + R + M - P);
+  s.degrees_of_freedom = static_cast<long>(N + R + data.C.rows() - P);
   s.residual_variance =
       s.degrees_of_freedom > 0 ? data.z.squaredNorm() / static_cast<double>(s.degrees_of_freedom) : kNaN;
   const Variances v = variances(data, s.degrees_of_freedom, s.residual_variance);
@@ -116,109 +212,39 @@ FitStatistics fit_statistics(const FitData& data) {
   }
   s.inflation.setOnes(P);
 
-  // Columns of unit length; zero columns are left out, unless equations tie their parameters to others.
-  VectorXd size = rho.cwiseAbs(), length = J.colwise().norm().transpose();
-  for (Index k = 0; k < P; ++k)
-    if (size(k) == 0) size(k) = 1;
-  const VectorXd& change = data.change.size() == P ? data.change : size;
-  const double most_seen = length.cwiseProduct(change.cwiseAbs()).maxCoeff();
-  std::vector<Index> used;
+  const VectorXd size = data.rho.unaryExpr([](double x) { return x == 0 ? 1 : std::abs(x); });
+  const Columns columns = columns_of(data, J, size);
   std::vector<VectorXd> unseen;  // directions, in changes over sizes
-  for (Index k = 0; k < P; ++k) {
-    const double seen = length(k) * std::abs(change(k));
-    const bool tied = M > 0 && !data.C.col(k).isZero(0) && change(k) != 0 && most_seen > 0;
-    if (seen > 0 && seen > kNoInfluence * data.record) {
-      used.push_back(k);
-    } else if (tied) {  // the equations may determine it by what others show
-      used.push_back(k), length(k) = most_seen / std::abs(change(k));
-    } else {
-      unseen.push_back(VectorXd::Unit(P, k));
-    }
-  }
+  for (const Index k : columns.unseen) unseen.push_back(VectorXd::Unit(P, k));
   if (!unseen.empty()) s.condition_number = kInfinity;
-  const Index U = static_cast<Index>(used.size());
   s.singular_values.setZero(static_cast<Index>(unseen.size()));
-  if (U > 0) {
-    MatrixXd scaled(N + R, U);
-    for (Index c = 0; c < U; ++c)
-      scaled.col(c) = J.col(used[static_cast<std::size_t>(c)]) / length(used[static_cast<std::size_t>(c)]);
-    const MatrixXd Z = M > 0 ? null_space_of(data.C(Eigen::all, used) * length(used).cwiseInverse().asDiagonal())
-                             : MatrixXd::Identity(U, U);
-    const Index F = Z.cols();
-    // Singular values of the triangular factor, which is as small as the number of parameters.
-    MatrixXd triangle = scaled * Z;
-    if (N + R > F) triangle = triangular_factor(std::move(triangle));
-    const RightSingular svd = right_singular(triangle);
-    VectorXd sigma = VectorXd::Zero(F);
-    sigma.head(svd.values.size()) = svd.values;
-    const Index rank = (sigma.array() > std::max(kRankTolerance, data.accuracy) * sigma(0)).count();
+  if (!columns.used.empty()) {
+    const MatrixXd scaled = J(Eigen::all, columns.used) * columns.length(columns.used).cwiseInverse().asDiagonal();
+    const Directions directions = directions_of(data, scaled, columns);
+    const VectorXd& sigma = directions.sigma;
+    const Index F = sigma.size(), rank = directions.rank;
     if (unseen.empty()) s.condition_number = sigma(F - 1) > 0 ? sigma(0) / sigma(F - 1) : kInfinity;
-    const MatrixXd directions = Z * svd.V;
     s.singular_values.setZero(F + static_cast<Index>(unseen.size()));
     s.singular_values.head(F) = sigma, s.rank = static_cast<long>(rank);
-    if (rank > 1) {
-      s.weakest.setZero(P);
-      for (Index a = 0; a < U; ++a) s.weakest(used[static_cast<std::size_t>(a)]) = directions(a, rank - 1);
-    }
-
-    const MatrixXd V = directions.leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal();
-    const MatrixXd white = variance * (V * V.transpose());
-    MatrixXd covariance = white;
-    if (sandwich) {
-      const MatrixXd q = scaled * V, inverse = V * V.transpose(), a_J = scaled.topRows(N) * inverse;
-      const VectorXd z = influences(data);
-      const MatrixXd scores = scores_of(z, scaled.topRows(N));
-      const MatrixXd within = inverse * scores_vary.within(scores) * inverse;
-      VectorXd left_out;
-      if (scores_vary.has_windows()) {
-        std::vector<Index> held;
-        for (Index a = 0; a < U && !data.at_bound.empty(); ++a)
-          if (data.at_bound[static_cast<std::size_t>(used[static_cast<std::size_t>(a)])]) held.push_back(a);
-        left_out = scores_vary.left_out(z, scaled.topRows(N), inverse_without(V, held));
-      }
-      VectorXd larger = VectorXd::Ones(U);  // standard errors than those of `within`
-      for (Index a = 0; a < U; ++a) {
-        const Index k = used[static_cast<std::size_t>(a)];
-        const bool alone = !data.of_one_record.empty() && data.of_one_record[static_cast<std::size_t>(k)];
-        const bool by_windows = !alone && scores_vary.has_windows();
-        VectorXd of_k = scores * inverse.col(a);
-        if (by_windows) of_k += a_J.col(a).cwiseProduct(left_out - z);
-        const double kept = by_windows ? 1 : scores_vary.kept(a_J.col(a), q.topRows(N), alone);
-        const double variance_k =
-            (scores_vary.is_between(alone) ? scores_vary.between(of_k) : scores_vary.within(of_k))(0, 0) / kept;
-        if (within(a, a) > 0) larger(a) = std::sqrt(variance_k / within(a, a));
-      }
-      covariance = larger.asDiagonal() * within * larger.asDiagonal();
-      if (R > 0) {  // v^2 J_prior'J_prior, which the scaled rows have v times
-        const MatrixXd prior = std::sqrt(variance) * scaled.bottomRows(R) * inverse;
-        covariance += prior.transpose() * prior;
-      }
-    }
-    for (Index a = 0; a < U; ++a)
-      for (Index b = 0; b < U; ++b) {
-        const Index ka = used[static_cast<std::size_t>(a)], kb = used[static_cast<std::size_t>(b)];
-        s.covariance(ka, kb) = covariance(a, b) / (length(ka) * length(kb));
-        if (a == b && white(a, a) > 0) s.inflation(ka) = covariance(a, a) / white(a, a);
-        const double norm = std::sqrt(covariance(a, a) * covariance(b, b));
-        if (a != b) s.correlation(ka, kb) = norm > 0 ? covariance(a, b) / norm : 0;
-      }
+    if (rank > 1) s.weakest.setZero(P), s.weakest(columns.used) = directions.vectors.col(rank - 1);
+    const MatrixXd V = directions.over_sigma(), white = variance * (V * V.transpose());
+    set_covariance(s, columns,
+                   sandwich ? sandwich_covariance(data, scores_vary, scaled, V, columns.used, variance) : white, white);
     for (Index c = rank; c < F; ++c) {
       VectorXd direction = VectorXd::Zero(P);
-      for (Index a = 0; a < U; ++a) {
-        const Index k = used[static_cast<std::size_t>(a)];
-        direction(k) = directions(a, c) / (length(k) * size(k));
-      }
+      direction(columns.used) =
+          directions.vectors.col(c).cwiseQuotient(columns.length(columns.used).cwiseProduct(size(columns.used)));
       unseen.push_back(direction.normalized());
     }
   }
   MatrixXd null_space(P, static_cast<Index>(unseen.size()));
   for (std::size_t c = 0; c < unseen.size(); ++c) null_space.col(static_cast<Index>(c)) = unseen[c];
-  s.unidentifiable = determined_combinations(null_space, rho, size, data.names, data.units);
+  s.unidentifiable = determined_combinations(null_space, data.rho, size, data.names, data.units);
   const std::vector<bool> changed = changed_parameters(null_space);
   for (Index k = 0; k < P; ++k) {
     s.std_error(k) = changed[static_cast<std::size_t>(k)] ? kInfinity : std::sqrt(s.covariance(k, k));
     const double half = s.std_error(k) == 0 ? 0 : s.quantile * s.std_error(k);
-    s.ci95.row(k) << rho(k) - half, rho(k) + half;
+    s.ci95.row(k) << data.rho(k) - half, data.rho(k) + half;
   }
   if (!std::isfinite(s.variance))
     withhold_errors(s,
