@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Prints what docs/architecture.md promises, measured: lines, types and files of each folder, and which includes break
-the order of its table. Exit code 1 where one does, or where files include each other in a circle.
+the order of its table. Exit code 1 where one does, where files include each other in a circle, or where a page or a
+comment names a file that does not exist.
 
     docs/architecture.py              run from anywhere; needs Python 3 alone
 """
@@ -13,6 +14,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 INCLUDE = re.compile(r'^#include "((?:core|optim|app)/[^"]+)"', re.M)
 TYPE = re.compile(r"^ *(?:template *<.*> *)?(?:struct|class|enum class) +(\w+)(?: final)?(?: *:[^:;]*)?(?: *:[^:;].*)? *\{", re.M)
+
+# A path as pages and comments write it; some leave the ending out, and some stand for several files.
+PATH = re.compile(r"(?<![\w/.])(?:core|optim|app|tests|bench|docs|problems|data|examples|cmake)/[\w./-]*\w(?![\w{*-]|/?[{*])")
+ENDINGS = ("", ".hpp", ".cpp", ".md", ".py", ".json")
 
 
 def folders_in_order():
@@ -48,6 +53,16 @@ def circles(includes):
     return found
 
 
+def stale_names():
+    """The paths that pages and sources name, and that do not exist."""
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    sources = [path for top in ("core", "optim", "app", "tests", "bench") for path in sorted((ROOT / top).rglob("*.[ch]pp"))]
+    for page in pages + sources:
+        for path in sorted(set(PATH.findall(page.read_text()))):
+            if "NAME" not in path and not any((ROOT / (path + ending)).exists() for ending in ENDINGS):
+                yield f"{page.relative_to(ROOT)} names {path}, which does not exist"
+
+
 def main():
     order = folders_in_order()
     text = {path.relative_to(ROOT).as_posix(): path.read_text()
@@ -73,7 +88,8 @@ def main():
     for name in sorted(counts, key=lambda f: order.index(f) if f in order else len(order)):
         print(f"{name:<20}{counts[name][0]:>6}{counts[name][1]:>8}{counts[name][2]:>7}")
     print(f"{'all':<20}" + "".join(f"{sum(c[k] for c in counts.values()):>{w}}" for k, w in enumerate((6, 8, 7))))
-    print("\n".join(wrong) if wrong else "no include against the order of docs/architecture.md, no circle")
+    wrong += stale_names()
+    print("\n".join(wrong) if wrong else "no include against the order of docs/architecture.md, no circle, no stale path")
     return 1 if wrong else 0
 
 
