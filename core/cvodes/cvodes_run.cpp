@@ -128,9 +128,8 @@ Eigen::VectorXd ForwardRun::quadrature_atol() const {
 }
 
 double ForwardRun::bounded(double value, std::size_t quadrature) {
-  if (std::abs(value) <= kLargestRate) return value;
-  left_range_[quadrature] = true;
-  return std::isnan(value) ? 0 : std::copysign(kLargestRate, value);
+  if (!(std::abs(value) <= kLargestRate)) left_range_[quadrature] = true;
+  return left_range_[quadrature] ? 0 : value;
 }
 
 int ForwardRun::f(realtype t, N_Vector y, N_Vector ydot, void* self) {

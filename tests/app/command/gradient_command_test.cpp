@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "app/terminal/exit_code.hpp"
+#include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 
 using namespace mbsopt;
@@ -23,6 +24,22 @@ TEST_CASE("gradient: every method gives every objective and parameter the same d
         CHECK(derivative == Approx(reference.at(objective).at("gradient").at(parameter).get<double>()).epsilon(1e-7));
       }
     }
+  }
+}
+
+// exp(1000 x) passes 1e120 where its derivative changes its sign.
+TEST_CASE("gradient by cvodes_forward gets through a sharp extreme", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = MBSOPT_SOURCE_DIR "/problems/four_bar/balanced.json";
+  nlohmann::json travel;
+  for (const char* const method : {"adjoint", "cvodes_forward"}) {
+    const CommandOutcome outcome = run_command({"gradient", file, "--out", folder.file("out"), "--method", method});
+    INFO(outcome.err);
+    REQUIRE(outcome.exit_code == kDone);
+    const nlohmann::json found = json_of(folder.path / "out/result.json").at("objectives").at("travel").at("gradient");
+    if (travel.is_null()) travel = found;
+    for (const auto& [name, derivative] : travel.items())
+      CHECK(found.at(name).get<double>() == Approx(derivative.get<double>()).epsilon(1e-6));
   }
 }
 
