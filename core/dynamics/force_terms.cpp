@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/derivative_blocks.hpp"
 
@@ -27,7 +28,7 @@ ForceTerms::ForceTerms(const MechanismData& data) : data_(data) {
   for (const AppliedForce& f : data.applied) {
     for (const Program& component : f.components) component.grow(program_);
   }
-  y_bar_.setZero(14 * data.n);
+  y_bar_.setZero(StateLayout{data.n}.size());
   rho_bar_.setZero(data.rho.size());
 }
 
@@ -116,6 +117,7 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
       f.tangent(x, f1, f2, t1, t2, {}, load1, load2);
     });
   });
+  const StateLayout layout{data_.n};
   const int t = static_cast<int>(data_.rho.size());
   for (const AppliedForce& f : data_.applied) {
     if (!depends_on_state(f) || (but_torques && is_free_torque(f))) continue;
@@ -132,10 +134,10 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
       for (int i = 0; i < 3; ++i) dc(i, 0) = gradients_[index(i)][index(t + 1 + s)];
       load.setZero();
       f.tangent(c, dc, frame, kStill, nullptr, load);
-      for (int j = 0; j < data_.n; ++j) {
-        const Vec<7> q = y_bar_.segment<7>(7 * j), v = y_bar_.segment<7>(7 * (data_.n + j));
+      for (int read = 1; read <= data_.n; ++read) {
+        const Vec<7> q = y_bar_.segment<7>(layout.q(read)), v = y_bar_.segment<7>(layout.v(read));
         if (q.isZero(0) && v.isZero(0)) continue;
-        MotionBlocks::Block<6>& block = out.b[index(out.pair(row, j))];
+        MotionBlocks::Block<6>& block = out.b[index(out.pair(row, read - 1))];
         block.q += load.col(0) * q.transpose();
         block.v += load.col(0) * v.transpose();
         block.parts |= MotionBlocks::r | MotionBlocks::p | MotionBlocks::rdot | MotionBlocks::pdot;
