@@ -152,9 +152,9 @@ const MotionBlocks& MotionTerms::blocks() {
   x.constraints.add(bodies, frames, x.units, lambda, x.blocks);
   forces_.add_blocks(here(), x.units, x.blocks);
   if (!data_.user_forces.empty()) user_.add_blocks(here(), bodies, z, x.blocks);
-  for (int i = 0; i < data_.n; ++i) {
+  for (int i = 1; i <= data_.n; ++i) {
     // -(omega x J omega)' = (skew(J omega) - skew(omega) J) omega',   omega' = 2 (G(p) pdot' - G(pdot) p')
-    const std::size_t k = static_cast<std::size_t>(i) + 1;
+    const std::size_t k = static_cast<std::size_t>(i);
     const BodyState& body = bodies[k];
     const Matrix3d& J = data_.bodies[k].J;
     const Vector3d omega = body.omega();

@@ -94,7 +94,7 @@ void PlanarDynamics::add_torque_blocks() {
         if (loaded == 0) continue;
         const double sign = loaded == read ? -1 : 1;
         const Plane by_P = sign * (f.f_x * theta + f.f_xdot * omega), by_Pdot = (sign * f.f_xdot) * theta;
-        ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(loaded - 1, read - 1))];
+        ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(loaded, read))];
         block.q.row(2).tail<2>() += Eigen::RowVector2d(by_P.im, by_P.re);
         block.v.row(2).tail<2>() += Eigen::RowVector2d(by_Pdot.im, by_Pdot.re);
         block.filled = true;
@@ -104,8 +104,8 @@ void PlanarDynamics::add_torque_blocks() {
   torques_.for_each_hinge(here(), frames_, forces_.law_scratch(), add);
   forces_.for_each_free_torque(here(), [&](std::size_t body, const Vector3d& c) {
     const Plane& P = bodies_[body].P;
-    const int row = static_cast<int>(body) - 1;
-    ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(row, row))];
+    const int own = static_cast<int>(body);
+    ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(own, own))];
     block.q.row(2).tail<2>() += 2 * c(model_.n) * Eigen::RowVector2d(P.re, P.im);
     block.filled = true;
   });
