@@ -87,11 +87,12 @@ std::string moves_most(const Scene& scene, const Linearisation& x, const State& 
     moves.cwiseAbs().maxCoeff(&axis);
     if (moves.norm() > largest) largest = moves.norm(), words = body + how + "xyz"[axis];
   };
-  for (std::size_t k = 1; k <= scene.bodies.size(); ++k) {
+  int k = 0;
+  for (const Body& body : scene.bodies) {
+    ++k;
     const Eigen::Vector4d p = state.y.segment<4>(layout.p(k));
-    offer(x.modes.col(mode).segment<3>(layout.q(k)), scene.bodies[k - 1].name, " along ");
-    offer(2 * x.length * (A(p) * (G(p) * x.modes.col(mode).segment<4>(layout.p(k)))), scene.bodies[k - 1].name,
-          " about ");
+    offer(x.modes.col(mode).segment<3>(layout.q(k)), body.name, " along ");
+    offer(2 * x.length * (A(p) * (G(p) * x.modes.col(mode).segment<4>(layout.p(k)))), body.name, " about ");
   }
   return words;
 }

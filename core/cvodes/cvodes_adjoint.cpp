@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/body/state_layout.hpp"
 #include "core/cvodes/cvodes.hpp"
 
 namespace mbsopt::cvodes {
@@ -27,7 +28,7 @@ Adjoint::Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<
     : run_(run),
       settings_(settings),
       costs_(costs),
-      states_(14 * run.flow().data().n),
+      states_(StateLayout{run.flow().data().n}.size()),
       objectives_(static_cast<Eigen::Index>(costs.size())),
       active_(static_cast<Eigen::Index>(run.flow().data().active.size())),
       kept_steps_(steps_between_checkpoints(states_)),

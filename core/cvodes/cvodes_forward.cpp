@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/body/state_layout.hpp"
 #include "core/cvodes/cvodes.hpp"
 
 namespace mbsopt::cvodes {
@@ -15,10 +16,10 @@ Sensitivities::Sensitivities(ForwardRun& run, const SimulationSettings& settings
       sampling_(sampling),
       active_(run.flow().data().active),
       blocks_(parameter_blocks(run.flow().data())),
-      s_(static_cast<int>(active_.size()), 14 * run.flow().data().n, run.context()),
-      rate_(14 * run.flow().data().n, run.context()) {
+      s_(static_cast<int>(active_.size()), StateLayout{run.flow().data().n}.size(), run.context()),
+      rate_(StateLayout{run.flow().data().n}.size(), run.context()) {
   const MechanismData& d = run.flow().data();
-  const Eigen::Index states = 14 * d.n;
+  const Eigen::Index states = StateLayout{d.n}.size();
   const int count = static_cast<int>(active_.size());
   direction_.setZero(states, kLanes), change_.setZero(states, kLanes);
   y_bar_.setZero(states), rho_bar_.setZero(d.rho.size());

@@ -2,6 +2,8 @@
 
 #include <cvodes/cvodes_ls.h>
 
+#include "core/body/state_layout.hpp"
+
 namespace mbsopt::cvodes {
 
 LinearSolver::LinearSolver(Flow& flow, const Context& context)
@@ -9,7 +11,7 @@ LinearSolver::LinearSolver(Flow& flow, const Context& context)
       matrix_(flow),
       solver_(SUNLinSolNewEmpty(context)),
       handle_(SUNMatNewEmpty(context)),
-      states_(14 * flow.data().n) {
+      states_(StateLayout{flow.data().n}.size()) {
   if (!solver_ || !handle_) throw std::bad_alloc();
   solver_->content = this;
   solver_->ops->gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };

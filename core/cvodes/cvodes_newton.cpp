@@ -1,5 +1,7 @@
 #include "core/cvodes/cvodes_newton.hpp"
 
+#include "core/body/state_layout.hpp"
+
 namespace mbsopt::cvodes {
 
 NewtonMatrix::NewtonMatrix(Flow& flow)
@@ -8,7 +10,7 @@ NewtonMatrix::NewtonMatrix(Flow& flow)
       jacobian_(flow.data()),
       values_(jacobian_.values()),
       system_(flow.data(), jacobian_) {
-  y_.setZero(14 * flow.data().n);
+  y_.setZero(StateLayout{flow.data().n}.size());
 }
 
 bool NewtonMatrix::linearise(double t, const Flow::Numbers& y) {

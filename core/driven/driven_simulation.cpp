@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/cvodes/cvodes.hpp"
 #include "core/driven/driven_run.hpp"
@@ -35,9 +36,9 @@ std::string why_integrated(const MechanismData& d, const SimulationSettings& s) 
 // state.
 bool leaves_plane(const MechanismData& d, Eigen::VectorXd y_bar) {
   const PlanarBodies plane(*d.planar);
-  for (int i = 1; i <= d.n; ++i) {
-    for (const Eigen::Index first : {7 * (i - 1), 7 * (d.n + i - 1)}) {
-      const std::size_t body = static_cast<std::size_t>(i);
+  const StateLayout layout{d.n};
+  for (std::size_t body = 1; body < d.bodies.size(); ++body) {
+    for (const Eigen::Index first : {layout.q(body), layout.v(body)}) {
       plane.add_vector(-1.0 * plane.vector(y_bar, first), first, y_bar);
       plane.add_turn(body, -1.0 * plane.turn(body, y_bar, first + 3), first + 3, y_bar);
     }

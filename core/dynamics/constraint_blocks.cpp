@@ -23,9 +23,9 @@ ConstraintBlocks::ConstraintBlocks(const MechanismData& data, const MotionBlocks
     for (int i = 0; i < 2; ++i) {
       if (body[i] == 0) continue;
       for (int j = 0; j < 2; ++j) {
-        if (body[j] > 0) p.pair[i][j] = blocks.pair(body[i] - 1, body[j] - 1);
+        if (body[j] > 0) p.pair[i][j] = blocks.pair(body[i], body[j]);
       }
-      for (int r = 0; r < c.rows(); ++r) p.row[i][at(r)] = blocks.row(c.row + r, body[i] - 1);
+      for (int r = 0; r < c.rows(); ++r) p.row[i][at(r)] = blocks.row(c.row + r, body[i]);
     }
     places_.push_back(p);
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 
 namespace mbsopt {
@@ -190,10 +191,11 @@ void ConstraintRows::add_shared_square(const Eigen::VectorXd& alpha, BlockCholes
 }
 
 Eigen::MatrixXd ConstraintRows::dense() const {
+  const StateLayout layout{data_->n};
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(data_->m, 6 * data_->n);
   for (const RowGroup& g : data_->groups) {
-    if (g.body1 > 0) J.block(g.row, 6 * (g.body1 - 1), g.rows, 6) += J1.middleRows(g.block, g.rows);
-    if (g.body2 > 0) J.block(g.row, 6 * (g.body2 - 1), g.rows, 6) += J2.middleRows(g.block, g.rows);
+    if (g.body1 > 0) J.block(g.row, layout.z(g.body1), g.rows, 6) += J1.middleRows(g.block, g.rows);
+    if (g.body2 > 0) J.block(g.row, layout.z(g.body2), g.rows, 6) += J2.middleRows(g.block, g.rows);
   }
   return J;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/derivative_blocks.hpp"
 
@@ -27,7 +28,7 @@ ForceTerms::ForceTerms(const MechanismData& data) : data_(data) {
   for (const AppliedForce& f : data.applied) {
     for (const Program& component : f.components) component.grow(program_);
   }
-  y_bar_.setZero(14 * data.n);
+  y_bar_.setZero(StateLayout{data.n}.size());
   rho_bar_.setZero(data.rho.size());
 }
 
@@ -92,7 +93,7 @@ void ForceTerms::add_pair(std::size_t body1, std::size_t body2, const std::vecto
       Lanes<6> load1 = Lanes<6>::Zero(), load2 = Lanes<6>::Zero();
       tangent(first ? t : kStill, first ? kStill : t, load1, load2);
       const auto block = [&](std::size_t body) -> MotionBlocks::Block<6>& {
-        return out.b[index(out.pair(static_cast<int>(body) - 1, static_cast<int>(read) - 1))];
+        return out.b[index(out.pair(static_cast<int>(body), static_cast<int>(read)))];
       };
       if (body1 > 0) block(body1).add(part, load1);
       if (body2 > 0) block(body2).add(part, load2);
@@ -116,15 +117,15 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
       f.tangent(x, f1, f2, t1, t2, {}, load1, load2);
     });
   });
+  const StateLayout layout{data_.n};
   const int t = static_cast<int>(data_.rho.size());
   for (const AppliedForce& f : data_.applied) {
     if (!depends_on_state(f) || (but_torques && is_free_torque(f))) continue;
     const Vector3d c = components_with_gradients(f, at);
     const Frame& frame = at.frames[index(f.body)];
-    const int row = f.body - 1;
     Lanes<6> load = Lanes<6>::Zero();
     f.tangent(c, Lanes<3>::Zero(), frame, units[index(f.body)].p, nullptr, load);
-    out.b[index(out.pair(row, row))].add(MotionBlocks::p, load);
+    out.b[index(out.pair(f.body, f.body))].add(MotionBlocks::p, load);
     for (const int s : f.sensors) {
       y_bar_.setZero(), rho_bar_.setZero();
       add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
@@ -132,10 +133,10 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
       for (int i = 0; i < 3; ++i) dc(i, 0) = gradients_[index(i)][index(t + 1 + s)];
       load.setZero();
       f.tangent(c, dc, frame, kStill, nullptr, load);
-      for (int j = 0; j < data_.n; ++j) {
-        const Vec<7> q = y_bar_.segment<7>(7 * j), v = y_bar_.segment<7>(7 * (data_.n + j));
+      for (int read = 1; read <= data_.n; ++read) {
+        const Vec<7> q = y_bar_.segment<7>(layout.q(read)), v = y_bar_.segment<7>(layout.v(read));
         if (q.isZero(0) && v.isZero(0)) continue;
-        MotionBlocks::Block<6>& block = out.b[index(out.pair(row, j))];
+        MotionBlocks::Block<6>& block = out.b[index(out.pair(f.body, read))];
         block.q += load.col(0) * q.transpose();
         block.v += load.col(0) * v.transpose();
         block.parts |= MotionBlocks::r | MotionBlocks::p | MotionBlocks::rdot | MotionBlocks::pdot;

@@ -40,8 +40,9 @@ class MotionBlocks {
   // Both are sorted by the body of the equations (or the row), then by body.
   const std::vector<Place>& pairs() const { return pairs_; }
   const std::vector<Place>& rows() const { return rows_; }
-  int pair(int row, int body) const { return find(pairs_, pair_begin_, row, body); }  // its index
-  int row(int row, int body) const { return find(rows_, row_begin_, row, body); }
+  // The index of the block of two bodies, the ground being 0: of the equations of one in the coordinates of the other.
+  int pair(int loaded, int read) const { return find(pairs_, pair_begin_, loaded - 1, read - 1); }
+  int row(int row, int read) const { return find(rows_, row_begin_, row, read - 1); }
 
   std::vector<Block<6>> b;  // per pair
   std::vector<Block<1>> c;  // per row and body

@@ -12,6 +12,9 @@
 
 namespace mbsopt {
 
+// The first column of a body, counted from 0 as in MotionBlocks::Place, in q, v or a.
+inline int columns_of(int body) { return 7 * body; }
+
 class MotionJacobian {
  public:
   using Block = Mat<7, 7>;

@@ -24,7 +24,7 @@ MotionTerms::MotionTerms(const MechanismData& data, const FormulationSettings& s
   const std::size_t n = static_cast<std::size_t>(data.n);
   bodies.resize(n + 1), frames.resize(n + 1), body_loads_.resize(n + 1), load_dirs_.resize(n + 1), bars_.resize(n + 1);
   f.resize(n), z.resize(n), b_dir.resize(n);
-  y_.setZero(14 * data.n);
+  y_.setZero(StateLayout{data.n}.size());
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
   for (Eigen::VectorXd* x : {&lambda, &phi_, &phi_dot_}) x->setZero(data.m);
   for (LaneRows* x : {&constraint_dirs_.phi, &constraint_dirs_.phi_dot, &constraint_dirs_.phi_ddot, &c_dir}) {
@@ -118,12 +118,13 @@ void MotionTerms::acceleration_errors(Eigen::VectorXd& out) {
 
 double MotionTerms::usual_acceleration(double enough) const {
   double largest = 1e-9;
-  for (std::size_t i = 0; i < f.size() && !(largest >= enough); ++i) {
-    const BodyData& b = data_.bodies[i + 1];
-    const double omega = bodies[i + 1].omega().norm();
-    largest = std::max(largest, omega * (omega + frames[i + 1].rdot.norm()));
-    if (b.mass > 0) largest = std::max(largest, f[i].head<3>().norm() / b.mass);
-    if (b.J.trace() > 0) largest = std::max(largest, f[i].tail<3>().norm() / b.J.trace());
+  for (std::size_t k = 1; k < bodies.size() && !(largest >= enough); ++k) {
+    const BodyData& b = data_.bodies[k];
+    const Vec<6>& load = f[k - 1];
+    const double omega = bodies[k].omega().norm();
+    largest = std::max(largest, omega * (omega + frames[k].rdot.norm()));
+    if (b.mass > 0) largest = std::max(largest, load.head<3>().norm() / b.mass);
+    if (b.J.trace() > 0) largest = std::max(largest, load.tail<3>().norm() / b.J.trace());
   }
   return largest;
 }
@@ -151,9 +152,9 @@ const MotionBlocks& MotionTerms::blocks() {
   x.constraints.add(bodies, frames, x.units, lambda, x.blocks);
   forces_.add_blocks(here(), x.units, x.blocks);
   if (!data_.user_forces.empty()) user_.add_blocks(here(), bodies, z, x.blocks);
-  for (int i = 0; i < data_.n; ++i) {
+  for (int i = 1; i <= data_.n; ++i) {
     // -(omega x J omega)' = (skew(J omega) - skew(omega) J) omega',   omega' = 2 (G(p) pdot' - G(pdot) p')
-    const std::size_t k = static_cast<std::size_t>(i) + 1;
+    const std::size_t k = static_cast<std::size_t>(i);
     const BodyState& body = bodies[k];
     const Matrix3d& J = data_.bodies[k].J;
     const Vector3d omega = body.omega();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/dynamics/space.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/derivative_blocks.hpp"
@@ -50,7 +51,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       forces_(data),
       user_(data) {
   const std::size_t n = at(data.n);
-  y_.setZero(14 * data.n);
+  y_.setZero(StateLayout{data.n}.size());
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
   bodies_.resize(n + 1), frames_.resize(n + 1), dual_frames_.resize(n + 1);
   loads_.resize(n), z_.resize(n), eta_.resize(n);
@@ -87,13 +88,12 @@ void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::
   t_ = t;
   tangents_ready_ = false;
   laws_.set_time(t);
-  const Eigen::Index half = 7 * data_.n;
-  for (int i = 1; i <= data_.n; ++i) {
-    const Eigen::Index q = 7 * (i - 1), v = half + q;
-    Body& b = bodies_[at(i)];
-    PlanarFrame<double>& f = frames_[at(i)];
-    f.r = bodies_in_y_.vector(y, q), f.rdot = bodies_in_y_.vector(y, v), f.rddot = {};
-    b.P = bodies_in_y_.turn(at(i), y, q + 3), b.Pdot = bodies_in_y_.turn(at(i), y, v + 3);
+  const StateLayout layout{data_.n};
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    Body& b = bodies_[k];
+    PlanarFrame<double>& f = frames_[k];
+    f.r = bodies_in_y_.vector(y, layout.q(k)), f.rdot = bodies_in_y_.vector(y, layout.v(k)), f.rddot = {};
+    b.P = bodies_in_y_.turn(k, y, layout.p(k)), b.Pdot = bodies_in_y_.turn(k, y, layout.pdot(k));
     f.set_turn(b.P, b.Pdot, 0);
   }
   angles_ = angles;
@@ -106,10 +106,10 @@ void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::
 
 void PlanarDynamics::place_in_space() {
   in_space_ = true;
+  const StateLayout layout{data_.n};
   for (const std::size_t k : loaded_) {
-    const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1);
-    set_position(y_.segment<7>(q), states_in_space_[k], frames_in_space_[k]);
-    set_velocity(y_.segment<7>(7 * data_.n + q), states_in_space_[k], frames_in_space_[k]);
+    set_position(y_.segment<7>(layout.q(k)), states_in_space_[k], frames_in_space_[k]);
+    set_velocity(y_.segment<7>(layout.v(k)), states_in_space_[k], frames_in_space_[k]);
   }
 }
 
@@ -148,17 +148,16 @@ bool PlanarDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::V
   solver_.solve(loads_, g_, settings_.values, z_, lambda_);
   model_.spread(lambda_, lambda_of_phi_);
 
-  const Eigen::Index half = 7 * data_.n;
-  ydot.head(half) = y.tail(half);
-  ydot.tail(half).setZero();
+  const StateLayout layout{data_.n};
+  ydot.head(layout.positions()) = y.tail(layout.positions());
+  ydot.tail(layout.positions()).setZero();
   bool finite = true;
-  for (int i = 1; i <= data_.n; ++i) {
-    const Vec<3>& z = z_[at(i - 1)];
-    Body& b = bodies_[at(i)];
-    const Eigen::Index a = half + 7 * (i - 1);
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const Vec<3>& z = z_[k - 1];
+    Body& b = bodies_[k];
     b.omegadot = z(2);
-    bodies_in_y_.add_vector({z(0), z(1)}, a, ydot);
-    bodies_in_y_.add_turn(at(i), Plane{-squared_norm(b.Pdot), 0.5 * z(2)} * b.P, a + 3, ydot);
+    bodies_in_y_.add_vector({z(0), z(1)}, layout.v(k), ydot);
+    bodies_in_y_.add_turn(k, Plane{-squared_norm(b.Pdot), 0.5 * z(2)} * b.P, layout.pdot(k), ydot);
     finite = finite && z.allFinite();
   }
   return finite;
@@ -182,27 +181,26 @@ bool PlanarDynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::
                                const Eigen::Ref<const Eigen::VectorXd>& lambda) {
   set_state(t, y, angles);
   model_.gather(lambda, lambda_);
-  for (int i = 1; i <= data_.n; ++i) {
-    const Eigen::Index q = 7 * (i - 1);
-    const Plane& P = bodies_[at(i)].P;
-    const Plane rddot = bodies_in_y_.vector(a, q), Pddot = bodies_in_y_.turn(at(i), a, q + 3);
-    z_[at(i - 1)] << rddot.re, rddot.im, 2 * cross(P, Pddot) / squared_norm(P);
-    set_acceleration(at(i), z_[at(i - 1)]);
+  const StateLayout layout{data_.n};
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const Plane& P = bodies_[k].P;
+    const Plane rddot = bodies_in_y_.vector(a, layout.q(k)), Pddot = bodies_in_y_.turn(k, a, layout.p(k));
+    z_[k - 1] << rddot.re, rddot.im, 2 * cross(P, Pddot) / squared_norm(P);
+    set_acceleration(k, z_[k - 1]);
   }
   return solver_.factor(frames_);
 }
 
 void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar,
                                  Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
-  const Eigen::Index half = 7 * data_.n;
-  for (int i = 1; i <= data_.n; ++i) {
-    const Eigen::Index a = half + 7 * (i - 1);
-    const Plane rddot_bar = bodies_in_y_.vector(w, a), Pddot_bar = bodies_in_y_.turn(at(i), w, a + 3);
-    loads_[at(i - 1)] << rddot_bar.re, rddot_bar.im, 0.5 * cross(bodies_[at(i)].P, Pddot_bar);
+  const StateLayout layout{data_.n};
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const Plane rddot_bar = bodies_in_y_.vector(w, layout.v(k)), Pddot_bar = bodies_in_y_.turn(k, w, layout.pdot(k));
+    loads_[k - 1] << rddot_bar.re, rddot_bar.im, 0.5 * cross(bodies_[k].P, Pddot_bar);
   }
   g_.setZero();
   solver_.solve(loads_, g_, settings_.derivatives, eta_, mu_);
-  y_bar.tail(half) += w.head(half);
+  y_bar.tail(layout.positions()) += w.head(layout.positions());
 
   for (PlanarFrameBar& bar : bars_) bar = {};
   for (std::size_t k = 1; k < bodies_.size(); ++k) set_virtual(eta_[k - 1], frames_[k]);
@@ -219,15 +217,13 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
   }
   if (has_other_forces_ || (has_springs_ && !springs_in_plane_)) add_force_adjoint(y_bar, theta_bar, rho_bar);
 
-  for (int i = 1; i <= data_.n; ++i) {
-    const std::size_t k = at(i);
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
     const Body& b = bodies_[k];
     const PlanarFrame<double>& f = frames_[k];
     const BodyData& body = data_.bodies[k];
     const Vec<3>& eta = eta_[k - 1];
     const PlanarFrameBar& bar = bars_[k];
-    const Eigen::Index q = 7 * (i - 1), v = half + q;
-    const Plane Pddot_bar = bodies_in_y_.turn(k, w, v + 3);
+    const Plane Pddot_bar = bodies_in_y_.turn(k, w, layout.pdot(k));
     // A_eta = i eta_theta A and the frame's turn (PlanarFrame::set_turn), then Pddot.
     const Plane A_bar =
         bar.A - eta(2) * times_i(bar.A_eta) + conj(Plane{-2 * squared_norm(b.Pdot), b.omegadot}) * bar.Addot;
@@ -235,10 +231,10 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
                         conj(Plane{-squared_norm(b.Pdot), 0.5 * b.omegadot}) * Pddot_bar;
     const Plane Pdot_bar = 2 * (conj(b.P) * bar.Adot) + 4 * (conj(b.Pdot) * bar.Addot) -
                            (4 * dot(f.A, bar.Addot) + 2 * dot(b.P, Pddot_bar)) * b.Pdot;
-    bodies_in_y_.add_vector(bar.r, q, y_bar);
-    bodies_in_y_.add_vector(bar.rdot, v, y_bar);
-    bodies_in_y_.add_turn(k, P_bar, q + 3, y_bar);
-    bodies_in_y_.add_turn(k, Pdot_bar, v + 3, y_bar);
+    bodies_in_y_.add_vector(bar.r, layout.q(k), y_bar);
+    bodies_in_y_.add_vector(bar.rdot, layout.v(k), y_bar);
+    bodies_in_y_.add_turn(k, P_bar, layout.p(k), y_bar);
+    bodies_in_y_.add_turn(k, Pdot_bar, layout.pdot(k), y_bar);
     InPlane::subtract_mass_bar(data_, k, eta, z_against_gravity(k), theta_bar);
     if (data_.slot_gravity >= 0) {
       theta_bar.segment<3>(data_.slot_gravity) += body.mass * model_.in_space({eta(0), eta(1)});
@@ -257,11 +253,10 @@ void PlanarDynamics::add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen:
   }
   user_.add_pull_back(here(), states_in_space_, no_mass_terms_, eta_in_space_, y_bar, rho_bar);
   forces_.add_pull_back(here(), bars_in_space_, y_bar, theta_bar, rho_bar, springs_in_plane_);
-  const Eigen::Index half = 7 * data_.n;
+  const StateLayout layout{data_.n};
   for (const std::size_t k : loaded_) {
-    const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1);
     add_pull_back(states_in_space_[k], bars_in_space_[k], Vector4d::Zero(), eta_[k - 1](2) * model_.bodies[k].n,
-                  y_bar.segment<7>(q), y_bar.segment<7>(half + q));
+                  y_bar.segment<7>(layout.q(k)), y_bar.segment<7>(layout.v(k)));
   }
 }
 

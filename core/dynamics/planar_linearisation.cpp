@@ -1,5 +1,6 @@
 // Tangents of the planar equations: right-hand sides and accelerations in directions of the state and the parameters.
 #include "core/body/lanes.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/dynamics/planar_dynamics.hpp"
 #include "core/dynamics/space.hpp"
@@ -93,7 +94,7 @@ void PlanarDynamics::add_torque_blocks() {
         if (loaded == 0) continue;
         const double sign = loaded == read ? -1 : 1;
         const Plane by_P = sign * (f.f_x * theta + f.f_xdot * omega), by_Pdot = (sign * f.f_xdot) * theta;
-        ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(loaded - 1, read - 1))];
+        ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(loaded, read))];
         block.q.row(2).tail<2>() += Eigen::RowVector2d(by_P.im, by_P.re);
         block.v.row(2).tail<2>() += Eigen::RowVector2d(by_Pdot.im, by_Pdot.re);
         block.filled = true;
@@ -103,8 +104,8 @@ void PlanarDynamics::add_torque_blocks() {
   torques_.for_each_hinge(here(), frames_, forces_.law_scratch(), add);
   forces_.for_each_free_torque(here(), [&](std::size_t body, const Vector3d& c) {
     const Plane& P = bodies_[body].P;
-    const int row = static_cast<int>(body) - 1;
-    ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(row, row))];
+    const int own = static_cast<int>(body);
+    ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(own, own))];
     block.q.row(2).tail<2>() += 2 * c(model_.n) * Eigen::RowVector2d(P.re, P.im);
     block.filled = true;
   });
@@ -112,14 +113,16 @@ void PlanarDynamics::add_torque_blocks() {
 
 // Adds the tangent of the forces to b: in the state by their blocks, and in the fields.
 void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
+  const StateLayout layout{data_.n};
   const ForceLinearisation& x = *force_linearisation_;
   const LaneRow* y = entries(y_dir);
   for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
     if (!x.in_plane[k].filled) continue;
     const MotionBlocks::Place& place = x.blocks.pairs()[k];
-    const LaneRow* r = y + 7 * place.body;
-    const LaneRow* rdot = r + 7 * data_.n;
-    const LaneRow* P = entries(turn_dirs_[at(place.body + 1)]);
+    const std::size_t read = at(place.body + 1);
+    const LaneRow* r = y + layout.q(read);
+    const LaneRow* rdot = y + layout.v(read);
+    const LaneRow* P = entries(turn_dirs_[read]);
     LaneRow* b = entries(rhs_lanes_[at(place.row)]);
     const Mat<3, 4>&q = x.in_plane[k].q, &v = x.in_plane[k].v;
     const Vec<3>& height = x.in_plane[k].height;
@@ -142,13 +145,12 @@ void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRo
 // Adds the tangents of laws and of all constraints except points, by dual numbers.
 void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneRows& y_dir) {
   using Order = PlanarConstraints::Order;
-  const Eigen::Index half = 7 * data_.n;
+  const StateLayout layout{data_.n};
   for (const std::size_t k : dual_bodies_) {
-    const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1), v = half + q;
     const Body& b = bodies_[k];
     PlanarFrame<LaneDual>& f = dual_frames_[k];
-    f.r = bodies_in_y_.vector(frames_[k].r, y_dir, q);
-    f.rdot = bodies_in_y_.vector(frames_[k].rdot, y_dir, v);
+    f.r = bodies_in_y_.vector(frames_[k].r, y_dir, layout.q(k));
+    f.rdot = bodies_in_y_.vector(frames_[k].rdot, y_dir, layout.v(k));
     f.rddot = frames_[k].rddot;
     const auto turn = [&](const Plane& value, Eigen::Index row) {
       return PlaneDual{{value.re, turn_dirs_[k].row(row).array()}, {value.im, turn_dirs_[k].row(row + 1).array()}};
@@ -171,13 +173,13 @@ void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneR
 void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir,
                                           Eigen::Ref<LaneRows> a_dir) {
   if (!tangents_ready_) prepare_tangents();
-  const Eigen::Index half = 7 * data_.n;
+  const StateLayout layout{data_.n};
   const LaneRow* y = entries(y_dir);
   for (std::size_t k = 1; k < bodies_.size(); ++k) {
     const PlanarBody& body = model_.bodies[k];
-    const LaneRow* p = y + 7 * (k - 1) + 3;
+    const LaneRow* p = y + layout.p(k);
     LaneRow* P = entries(turn_dirs_[k]);
-    for (int i = 0; i < 4; i += 2, p += half) {
+    for (int i = 0; i < 4; i += 2, p += layout.positions()) {
       P[i] = body.p_a(0) * p[0] + body.p_a(1) * p[1] + body.p_a(2) * p[2] + body.p_a(3) * p[3];
       P[i + 1] = body.p_b(0) * p[0] + body.p_b(1) * p[1] + body.p_b(2) * p[2] + body.p_b(3) * p[3];
     }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/planar_model.hpp"
 
@@ -18,9 +19,8 @@ PlanarSprings::PlanarSprings(const MechanismData& data) : data_(data) {
 
 bool PlanarSprings::lie_in_plane(const Eigen::VectorXd& y) const {
   if (!points_in_plane_) return false;
-  const auto height = [&](std::size_t body) {
-    return body == 0 ? 0.0 : y(7 * (static_cast<Eigen::Index>(body) - 1) + data_.planar->n);
-  };
+  const StateLayout layout{data_.n};
+  const auto height = [&](std::size_t body) { return body == 0 ? 0.0 : y(layout.q(body) + data_.planar->n); };
   for (const Spring& s : springs_) {
     if (height(s.body1) != height(s.body2)) return false;
   }

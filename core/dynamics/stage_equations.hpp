@@ -14,6 +14,7 @@
 
 #include <vector>
 
+#include "core/body/state_layout.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 
 namespace mbsopt {
@@ -22,7 +23,7 @@ class StageEquations {
  public:
   explicit StageEquations(SpatialDynamics& dynamics);  // uses its terms and the rows of its solver
 
-  static Eigen::Index count(const MechanismData& data) { return 7 * data.n + data.m; }
+  static Eigen::Index count(const MechanismData& data) { return StateLayout{data.n}.positions() + data.m; }
 
   // Sets the motion at which all functions below evaluate.
   void place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,

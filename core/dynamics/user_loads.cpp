@@ -69,7 +69,7 @@ void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, const
   constexpr int all = MotionBlocks::r | MotionBlocks::p | MotionBlocks::rdot | MotionBlocks::pdot;
   for (const Inertia& i : inertias_) {
     const InertialLoad& load = *i.force->force->inertia();
-    MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(i.body - 1, i.body - 1))];
+    MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(i.body, i.body))];
     set_state(*i.force, at.y);
     z_ = z[static_cast<std::size_t>(i.body) - 1];
     L_q_.setZero();
@@ -93,7 +93,7 @@ void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, const
       const BodyState& body = bodies[static_cast<std::size_t>(f.bodies[k])];
       for (std::size_t l = 0; l < f.bodies.size(); ++l) {
         const Eigen::Index column = block_of(l);
-        MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(f.bodies[k] - 1, f.bodies[l] - 1))];
+        MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(f.bodies[k], f.bodies[l]))];
         for (int c = 0; c < 7; ++c) {
           block.q.col(c) -= to_virtual(body, K_.block<7, 1>(row, column + c));
           block.v.col(c) -= to_virtual(body, C_.block<7, 1>(row, column + c));

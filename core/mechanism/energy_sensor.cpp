@@ -5,6 +5,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/inertia.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
@@ -14,15 +15,15 @@ namespace {
 
 void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, double scale, VecOut y_bar,
                           VecOut rho_bar) {
+  const StateLayout layout{d.n};
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
     const BodyAt b = body_at(y, i);
     const Vector3d w = b.state.omega(), w_bar = body.J * w;
-    const Eigen::Index q = 7 * (i - 1), v = y.size() / 2 + q;
-    y_bar.segment<3>(v) += scale * body.mass * b.frame.rdot;
+    y_bar.segment<3>(layout.v(i)) += scale * body.mass * b.frame.rdot;
     // w = 2 G(p) pdot = -2 G(pdot) p
-    y_bar.segment<4>(v + 3) += 2 * scale * G_transposed_times(b.state.p, w_bar);
-    y_bar.segment<4>(q + 3) -= 2 * scale * G_transposed_times(b.state.pdot, w_bar);
+    y_bar.segment<4>(layout.pdot(i)) += 2 * scale * G_transposed_times(b.state.p, w_bar);
+    y_bar.segment<4>(layout.p(i)) -= 2 * scale * G_transposed_times(b.state.pdot, w_bar);
     add_slot<1>(d, body.slot_mass, Vec<1>(0.5 * b.frame.rdot.squaredNorm()), scale, rho_bar);
     add_slot<6>(d, body.slot_J, inertia_gradient(0.5 * w * w.transpose()), scale, rho_bar);
   }
@@ -30,10 +31,11 @@ void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, doub
 
 void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                             double scale, VecOut y_bar, VecOut rho_bar) {
+  const StateLayout layout{d.n};
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
-    const Vector3d r = y.segment<3>(7 * (i - 1));
-    y_bar.segment<3>(7 * (i - 1)) -= scale * body.mass * d.gravity;
+    const Vector3d r = y.segment<3>(layout.q(i));
+    y_bar.segment<3>(layout.q(i)) -= scale * body.mass * d.gravity;
     add_slot<1>(d, body.slot_mass, Vec<1>(-d.gravity.dot(r)), scale, rho_bar);
     add_slot<3>(d, d.slot_gravity, Vec<3>(-body.mass * r), scale, rho_bar);
   }

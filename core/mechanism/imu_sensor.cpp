@@ -2,6 +2,7 @@
 //   a  specific force     m'A'(Pddot - g)    [m/s^2]    at rest it reads +g upwards
 //   w  angular velocity   m'omega_B          [rad/s]
 #include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/mechanism/point_sensors.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 
@@ -52,9 +53,9 @@ struct MountRateSensor final : SensorFunction {
     const Vector3d omega = b.state.omega();
     add_slot<3>(d, axis.slot, Vec<3>(omega), scale, rho_bar);
     if (body > 0) {  // omega_B = 2 G(p) pdot = -2 G(pdot) p
-      const Eigen::Index q = 7 * (body - 1), v = y_bar.size() / 2 + q;
-      y_bar.segment<4>(v + 3) += 2 * scale * G_transposed_times(b.state.p, axis.m);
-      y_bar.segment<4>(q + 3) -= 2 * scale * G_transposed_times(b.state.pdot, axis.m);
+      const StateLayout layout{d.n};
+      y_bar.segment<4>(layout.pdot(body)) += 2 * scale * G_transposed_times(b.state.p, axis.m);
+      y_bar.segment<4>(layout.p(body)) -= 2 * scale * G_transposed_times(b.state.pdot, axis.m);
     }
     return axis.m.dot(omega);
   }

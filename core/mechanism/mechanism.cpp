@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/body/state_layout.hpp"
 #include "core/mechanism/compile.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/state_point.hpp"
@@ -15,7 +16,7 @@ Mechanism::Mechanism(const Scene& scene, const Eigen::VectorXd& rho, const std::
           compile(scene, rho, active, std::move(user_forces), std::move(programs)))) {}
 
 int Mechanism::bodies() const { return data_->n; }
-int Mechanism::states() const { return 14 * data_->n; }
+int Mechanism::states() const { return static_cast<int>(StateLayout{data_->n}.size()); }
 int Mechanism::parameters() const { return static_cast<int>(data_->rho.size()); }
 const Eigen::VectorXd& Mechanism::rho() const { return data_->rho; }
 int Mechanism::sensors() const { return static_cast<int>(data_->sensors.size()); }

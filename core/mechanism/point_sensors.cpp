@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
+#include "core/body/state_layout.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 
 namespace mbsopt {
@@ -22,9 +23,9 @@ void add_acceleration(const MechanismData& d, const StatePoint& at, const BodyPo
   FrameBar bar;
   bar.set_zero();
   bar.Addot = scale * X * point.s.transpose();
-  const Eigen::Index q = 7 * (point.body - 1);
-  add_pull_back(b.state, bar, Vector4d::Zero(), Vector3d::Zero(), y_bar.segment<7>(q),
-                y_bar.segment<7>(y_bar.size() / 2 + q));
+  const StateLayout layout{d.n};
+  add_pull_back(b.state, bar, Vector4d::Zero(), Vector3d::Zero(), y_bar.segment<7>(layout.q(point.body)),
+                y_bar.segment<7>(layout.v(point.body)));
   // X'A (omegadot x s) = omegadot'(s x A'X)
   Vec<6>& out = at.motion->bar().z[static_cast<std::size_t>(point.body - 1)];
   out.head<3>() += scale * X;
@@ -51,7 +52,7 @@ struct Placed {
   double e0;
   Eigen::Map<const Vector3d> e;
 
-  Placed(const Eigen::VectorXd& y, int body) : Placed(y.data() + 7 * (body - 1)) {}
+  Placed(const Eigen::VectorXd& y, int body) : Placed(y.data() + StateLayout::of(y).q(body)) {}
   explicit Placed(const double* q) : r(q), e0(q[3]), e(q + 4) {}
 };
 
@@ -69,7 +70,7 @@ void add_place_bar(const MechanismData& d, const BodyPoint& point, const Eigen::
   const Placed b(y, point.body);
   const Vector3d &s = point.s, e_s = b.e.cross(s);
   const double along = s.dot(X_bar), e_X = b.e.dot(X_bar);
-  double* q_bar = y_bar.data() + 7 * (point.body - 1);
+  double* q_bar = y_bar.data() + StateLayout{d.n}.q(point.body);
   Eigen::Map<Vector3d>{q_bar} += X_bar;
   q_bar[3] += 2 * (b.e0 * along + e_s.dot(X_bar));
   Eigen::Map<Vector3d>{q_bar + 4} += 2 * (b.e.dot(s) * X_bar + e_X * s - along * b.e + b.e0 * s.cross(X_bar));

@@ -1,5 +1,6 @@
 // Angular velocity of a body, and its Euler parameters.
 //   omega_B = 2 G(p) pdot,  omega_G = A omega_B = 2 (e0 edot - e0dot e + e x edot)
+#include "core/body/state_layout.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -33,8 +34,9 @@ struct AngularVelocitySensor final : SensorFunction {
     Vector4d p_bar, pdot_bar;
     p_bar << d.dot(f), -pdot(0) * d + sign * f.cross(d);
     pdot_bar << -d.dot(e), p(0) * d + sign * d.cross(e);
-    y_bar.segment<4>(7 * (body - 1) + 3) += 2 * scale * p_bar;
-    y_bar.segment<4>(y_bar.size() / 2 + 7 * (body - 1) + 3) += 2 * scale * pdot_bar;
+    const StateLayout layout = StateLayout::of(y_bar);
+    y_bar.segment<4>(layout.p(body)) += 2 * scale * p_bar;
+    y_bar.segment<4>(layout.pdot(body)) += 2 * scale * pdot_bar;
     return result;
   }
   std::vector<int> bodies(const MechanismData&) const override { return {body}; }
@@ -48,18 +50,17 @@ struct AngularVelocitySensor final : SensorFunction {
 
 // One entry of y: an Euler parameter, or its rate.
 struct CoordinateFunction final : SensorFunction {
-  Eigen::Index index = 0;
+  int body = 0;
+  Eigen::Index index = 0;  // in y
 
   double value(const MechanismData&, const StatePoint& at) const override { return at.y(index); }
   double add_gradient(const MechanismData&, const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
     y_bar(index) += scale;
     return at.y(index);
   }
-  std::vector<int> bodies(const MechanismData& d) const override {
-    return {static_cast<int>(index % (7 * d.n)) / 7 + 1};
-  }
+  std::vector<int> bodies(const MechanismData&) const override { return {body}; }
   SensorPtr rate(const MechanismData& d) const override {
-    return changed(*this, [&](CoordinateFunction& r) { r.index += 7 * d.n; });
+    return changed(*this, [&](CoordinateFunction& r) { r.index += StateLayout{d.n}.positions(); });
   }
 };
 
@@ -78,7 +79,8 @@ std::unique_ptr<SensorFunction> make_orientation(Compilation& model, const Senso
     throw SceneError(where + ": orientation needs a moving body and a component e0, e1, e2 or e3");
   }
   auto out = std::make_unique<CoordinateFunction>();
-  out->index = 7 * (body - 1) + 3 + (s.component[1] - '0');
+  out->body = body;
+  out->index = StateLayout{model.data.n}.p(body) + (s.component[1] - '0');
   return out;
 }
 

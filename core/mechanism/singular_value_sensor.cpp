@@ -10,6 +10,7 @@
 // Loan, "Matrix Computations", section 8.6.
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
@@ -43,6 +44,7 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
   for_each_point(d, [&](const Vector3d& s, int) { sum += s.squaredNorm(), ++out.points; });
   if (sum > 0) out.length = std::sqrt(sum / out.points);
 
+  const StateLayout layout{d.n};
   out.J = Eigen::MatrixXd::Zero(d.m, 6 * d.n);
   for (const Constraint& c : d.constraints) {
     const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
@@ -51,8 +53,8 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
           Mat<P::kRows, 6> J1, J2;
           p.jacobian(b1.frame, b2.frame, J1, J2);
           J1.template rightCols<3>() /= out.length, J2.template rightCols<3>() /= out.length;
-          if (c.body1 > 0) out.J.block<P::kRows, 6>(c.row, 6 * (c.body1 - 1)) += c.factor * J1;
-          if (c.body2 > 0) out.J.block<P::kRows, 6>(c.row, 6 * (c.body2 - 1)) += c.factor * J2;
+          if (c.body1 > 0) out.J.block<P::kRows, 6>(c.row, layout.z(c.body1)) += c.factor * J1;
+          if (c.body2 > 0) out.J.block<P::kRows, 6>(c.row, layout.z(c.body2)) += c.factor * J2;
         },
         c.primitive);
   }
@@ -73,14 +75,16 @@ struct SingularValueFunction final : SensorFunction {
     const Scaled x = scaled(d, at.y);
     if (x.J.size() == 0) return x.smallest;
     Eigen::MatrixXd W = Eigen::MatrixXd::Zero(x.J.rows(), x.J.cols());  // w_i, then J's own columns
+    const StateLayout layout{d.n};
     double L_bar = 0;
     for (Eigen::Index i = 0; i < W.rows(); ++i) {
       if (!(x.norms(i) > 0)) continue;
       const Eigen::RowVectorXd j = x.J.row(i);
       W.row(i) = x.left(i) / x.norms(i) * (x.right.transpose() - j.dot(x.right) * j);
-      for (int b = 0; b < d.n; ++b) {
-        L_bar -= x.norms(i) / x.length * W.row(i).segment<3>(6 * b + 3).dot(j.segment<3>(6 * b + 3));
-        W.row(i).segment<3>(6 * b + 3) /= x.length;
+      for (int body = 1; body <= d.n; ++body) {
+        const Eigen::Index theta = layout.z(body) + 3;
+        L_bar -= x.norms(i) / x.length * W.row(i).segment<3>(theta).dot(j.segment<3>(theta));
+        W.row(i).segment<3>(theta) /= x.length;
       }
     }
     for (const Constraint& c : d.constraints)
@@ -96,7 +100,7 @@ struct SingularValueFunction final : SensorFunction {
   static void add_row(const MechanismData& d, const Constraint& c, int i, const Eigen::VectorXd& w,
                       const Eigen::VectorXd& y, double scale, VecOut y_bar, VecOut rho_bar) {
     const auto part = [&](int body) {
-      return body > 0 ? Vec<6>(w.segment<6>(6 * (body - 1))) : Vec<6>(Vec<6>::Zero());
+      return body > 0 ? Vec<6>(w.segment<6>(StateLayout{d.n}.z(body))) : Vec<6>(Vec<6>::Zero());
     };
     add_virtual_work_gradient(d, c, y, part(c.body1), part(c.body2), ConstraintRows::Unit(c.rows(), i), scale, y_bar,
                               rho_bar);

@@ -1,6 +1,7 @@
 // The largest |entry| of the constraint equations and the unit norms, and the equation that it belongs to.
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/mechanism/row_laws.hpp"
@@ -61,7 +62,8 @@ Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorX
         },
         c.primitive);
   }
-  for (int i = 1; i <= d.n; ++i) offer(UnitNorm::phi(y.segment<4>(7 * (i - 1) + 3)), -1, i);
+  const StateLayout layout{d.n};
+  for (int i = 1; i <= d.n; ++i) offer(UnitNorm::phi(y.segment<4>(layout.p(i))), -1, i);
   return worst;
 }
 
@@ -76,7 +78,7 @@ struct ViolationFunction final : SensorFunction {
     const Violation worst = worst_violation(d, t, y, angles);
     const double s = worst.amount < 0 ? -scale : scale;
     if (worst.body > 0) {
-      const Eigen::Index p = 7 * (worst.body - 1) + 3;
+      const Eigen::Index p = StateLayout{d.n}.p(worst.body);
       y_bar.segment<4>(p) += s * UnitNorm::phi_p(y.segment<4>(p));
       return std::abs(worst.amount);
     }

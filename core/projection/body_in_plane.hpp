@@ -9,6 +9,7 @@
 
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/dynamics/space.hpp"
 
 namespace mbsopt {
@@ -28,7 +29,7 @@ class BodyInPlane {
   };
 
   BodyInPlane(const MechanismData& data, int body, bool)
-      : in_y_(*data.planar), k_(at(body)), q_(7 * (body - 1)), v_(7 * (data.n + body - 1)) {}
+      : in_y_(*data.planar), k_(at(body)), q_(StateLayout{data.n}.q(body)), v_(StateLayout{data.n}.v(body)) {}
 
   void read_hat(const Eigen::VectorXd& y_hat, Frame& tilde) {
     r_hat_ = in_y_.vector(y_hat, q_), rdot_hat_ = in_y_.vector(y_hat, v_);

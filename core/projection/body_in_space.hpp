@@ -10,6 +10,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/dynamics/space.hpp"
 
@@ -22,7 +23,7 @@ class BodyInSpace {
   using Gradient = Vec<7>;
 
   BodyInSpace(const MechanismData& data, int body, bool positions)
-      : q_(7 * (body - 1)), v_(7 * (data.n + body - 1)), positions_(positions) {}
+      : q_(StateLayout{data.n}.q(body)), v_(StateLayout{data.n}.v(body)), positions_(positions) {}
 
   void read_hat(const Eigen::VectorXd& y_hat, Frame& tilde) {
     const Vector4d p_hat = y_hat.segment<4>(q_ + 3);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/projection/body_in_plane.hpp"
 #include "core/projection/body_in_space.hpp"
 #include "core/projection/projector_of.hpp"
@@ -60,7 +61,7 @@ bool ProjectorOf<Body>::factor(double t, const Y& y_hat) {
 template <class Body>
 bool ProjectorOf<Body>::project(double t, const Y& angles, const Y& y_hat, Y& y, ProjectionSolution& s) {
   if (!factor(t, y_hat)) return false;
-  const Eigen::Index half = 7 * data_.n;
+  const Eigen::Index half = StateLayout{data_.n}.positions();
   const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
                v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
   const auto displace = [&](const std::vector<X>&) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/projection/projector_of.hpp"
 
 namespace mbsopt {
@@ -28,7 +29,7 @@ template <class Body>
 bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) {
   if (!square_) return project(t, angles, y_hat, y, settled_);
   read_hat(t, y_hat);
-  const Eigen::Index half = 7 * data_.n;
+  const Eigen::Index half = StateLayout{data_.n}.positions();
   const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
                v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
   std::vector<X>& dx = corrections_.dx;
@@ -98,7 +99,8 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
   Y reached = y_hat;
   read_hat(t, reached);
   double violation = violation_at(Y::Zero(N * data_.n));
-  const double size = std::max(1.0, y_hat.head(7 * data_.n).cwiseAbs().maxCoeff());
+  const Eigen::Index half = StateLayout{data_.n}.positions();
+  const double size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff());
   for (int k = 0; k < kMost && violation > kUnmetPosition * size; ++k) {
     ++square_factorisations_;
     if (!std::isfinite(violation) || !J_factor_.compute(J_)) return false;
@@ -118,7 +120,7 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
     for_bodies([&](Body& b, std::size_t, auto& f) { b.start_velocity(f), b.write(f, reached); });
     read_hat(t, reached);
   }
-  reached.tail(7 * data_.n) = y_hat.tail(7 * data_.n);
+  reached.tail(half) = y_hat.tail(half);
   return settle(t, angles, reached, y);
 }
 

@@ -1,19 +1,22 @@
 #include "core/sensor/body_at.hpp"
 
+#include "core/body/state_layout.hpp"
+
 namespace mbsopt {
 
 BodyAt body_at(const Eigen::VectorXd& y, int body) {
   BodyAt b;
   if (body == 0) return b;
-  set_position(y.segment<7>(7 * (body - 1)), b.state, b.frame);
-  set_velocity(y.segment<7>(y.size() / 2 + 7 * (body - 1)), b.state, b.frame);
+  const StateLayout layout = StateLayout::of(y);
+  set_position(y.segment<7>(layout.q(body)), b.state, b.frame);
+  set_velocity(y.segment<7>(layout.v(body)), b.state, b.frame);
   return b;
 }
 
 void add_pull_back(const BodyAt& b, int body, const FrameBar& bar, double scale, Eigen::Ref<Eigen::VectorXd> y_bar) {
   if (body == 0) return;
-  add_pull_back_velocity(b.state, bar, scale, y_bar.segment<7>(7 * (body - 1)),
-                         y_bar.segment<7>(y_bar.size() / 2 + 7 * (body - 1)));
+  const StateLayout layout = StateLayout::of(y_bar);
+  add_pull_back_velocity(b.state, bar, scale, y_bar.segment<7>(layout.q(body)), y_bar.segment<7>(layout.v(body)));
 }
 
 }  // namespace mbsopt

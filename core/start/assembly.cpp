@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/linear/row_dependence.hpp"
@@ -40,12 +41,13 @@ Mat<4, 4> rate_matrix(const Vector3d& omega_G) {
 
 // rdot = velocity + omega_G x A(p) com
 VectorXd velocity_guess(const MechanismData& d, const VectorXd& q) {
-  VectorXd v(7 * d.n);
-  for (int i = 0; i < d.n; ++i) {
-    const BodyData& body = d.bodies[static_cast<std::size_t>(i + 1)];
-    const Vector4d p = q.segment<4>(7 * i + 3);
-    v.segment<3>(7 * i) = body.velocity + body.angular_velocity.cross(A(p) * body.com);
-    v.segment<4>(7 * i + 3) = rate_matrix(body.angular_velocity) * p;
+  const StateLayout layout{d.n};
+  VectorXd v(layout.positions());
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[at(i)];
+    const Vector4d p = q.segment<4>(layout.p(i));
+    v.segment<3>(layout.q(i)) = body.velocity + body.angular_velocity.cross(A(p) * body.com);
+    v.segment<4>(layout.p(i)) = rate_matrix(body.angular_velocity) * p;
   }
   return v;
 }
@@ -60,32 +62,33 @@ void add_field(const MechanismData& d, int slot, const Mat<Rows, N>& M, Eigen::R
 }
 
 MatrixXd position_guess_rho(const MechanismData& d) {
-  MatrixXd out = MatrixXd::Zero(7 * d.n, d.rho.size());
-  for (int i = 0; i < d.n; ++i) {
-    add_field<7, 7>(d, d.bodies[static_cast<std::size_t>(i + 1)].slot_q, Mat<7, 7>::Identity(),
-                    out.middleRows(7 * i, 7));
+  const StateLayout layout{d.n};
+  MatrixXd out = MatrixXd::Zero(layout.positions(), d.rho.size());
+  for (int i = 1; i <= d.n; ++i) {
+    add_field<7, 7>(d, d.bodies[at(i)].slot_q, Mat<7, 7>::Identity(), out.middleRows(layout.q(i), 7));
   }
   return out;
 }
 
-// v_q holds a block per body in its own p.
+// v_q holds a block per body in its own p; that of the ground is not set.
 void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, std::vector<Mat<7, 4>>& v_q,
                                 MatrixXd& v_rho) {
-  v_q.resize(static_cast<std::size_t>(d.n));
+  const StateLayout layout{d.n};
+  v_q.resize(d.bodies.size());
   v_rho = MatrixXd::Zero(q.size(), d.rho.size());
-  for (int i = 0; i < d.n; ++i) {
-    const BodyData& body = d.bodies[static_cast<std::size_t>(i + 1)];
-    const Vector4d p = q.segment<4>(7 * i + 3);
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[at(i)];
+    const Vector4d p = q.segment<4>(layout.p(i));
     const Matrix3d W = skew(body.angular_velocity);
     const Vector3d arm = A(p) * body.com, e = p.tail<3>();
-    v_q[static_cast<std::size_t>(i)] << W * N(p, body.com), rate_matrix(body.angular_velocity);
+    v_q[at(i)] << W * N(p, body.com), rate_matrix(body.angular_velocity);
     Mat<7, 3> from_omega;
     from_omega.topRows<3>() = -skew(arm);
     from_omega.row(3) = -0.5 * e.transpose();
     from_omega.bottomRows<3>() = 0.5 * (p(0) * Matrix3d::Identity() - skew(e));
-    add_field<3, 3>(d, body.slot_velocity, Matrix3d::Identity(), v_rho.middleRows(7 * i, 3));
-    add_field<3, 3>(d, body.slot_com, W * A(p), v_rho.middleRows(7 * i, 3));
-    add_field<7, 3>(d, body.slot_angular_velocity, from_omega, v_rho.middleRows(7 * i, 7));
+    add_field<3, 3>(d, body.slot_velocity, Matrix3d::Identity(), v_rho.middleRows(layout.q(i), 3));
+    add_field<3, 3>(d, body.slot_com, W * A(p), v_rho.middleRows(layout.q(i), 3));
+    add_field<7, 3>(d, body.slot_angular_velocity, from_omega, v_rho.middleRows(layout.q(i), 7));
   }
 }
 
@@ -97,6 +100,7 @@ struct Assembly::Solution {
         start(t),
         modes(sought),
         data(m.data()),
+        layout{data.n},
         position(data, AssemblyLevel::position, t),
         velocity(data, AssemblyLevel::velocity, t) {
     solve();
@@ -104,7 +108,7 @@ struct Assembly::Solution {
   }
 
   void solve() {
-    const Index N = 7 * data.n;
+    const Index N = layout.positions();
     result.y = VectorXd::Zero(2 * N);
     PositionProblem positions(position);
     const VectorXd guess = position_guess(data);
@@ -145,7 +149,7 @@ struct Assembly::Solution {
     constexpr double kSatisfied = 1e-11;  // of the equations, per unit of y, as in nearest_point.cpp
     const bool determined = data.planar && data.planar->rows.size() == 3 * static_cast<std::size_t>(data.n);
     if (!determined || data.equilibrium || !position.targets().empty() || !velocity.targets().empty()) return false;
-    const Index N = 7 * data.n;
+    const Index N = layout.positions();
     VectorXd y_guess = result.y, y = result.y;
     y_guess.tail(N) = velocity_guess(data, result.y.head(N));
     const std::unique_ptr<Projector> projector =
@@ -172,7 +176,7 @@ struct Assembly::Solution {
     position.start_branches(result.y);
     equilibrium = static_equilibrium(mechanism, start, q->x, position.angles());
     result.iterations += equilibrium.iterations;
-    result.y.head(7 * data.n) = equilibrium.q;
+    result.y.head(layout.positions()) = equilibrium.q;
     result.ok = equilibrium.ok;
     result.message = equilibrium.message;
   }
@@ -190,7 +194,7 @@ struct Assembly::Solution {
     return data.n >= kManyBodies && !q->linearised && !v->linearised;
   }
   Sparse sparse_derivatives() const {
-    const Index N = 7 * data.n;
+    const Index N = layout.positions();
     AssemblyEquations::SparseGradients F = position.sparse_gradients(result.y), G = velocity.sparse_gradients(result.y);
     std::vector<SparseEntry> G_q, G_v;
     for (const SparseEntry& e : G.y) {
@@ -216,8 +220,8 @@ struct Assembly::Solution {
     const MatrixXd q_rho = s.q.solve(s.q_b_rho, s.q_g_rho);
     MatrixXd b = s.v_b_rho, g = s.v_g_rho;
     for (const SparseEntry& e : s.v_b_q) b.row(e.row) += e.value * q_rho.row(e.column);
-    for (Index i = 0; i < data.n; ++i) {
-      g.middleRows<7>(7 * i) += s.v_g_q[static_cast<std::size_t>(i)] * q_rho.middleRows<4>(7 * i + 3);
+    for (int i = 1; i <= data.n; ++i) {
+      g.middleRows<7>(layout.q(i)) += s.v_g_q[at(i)] * q_rho.middleRows<4>(layout.p(i));
     }
     MatrixXd y_rho(result.y.size(), data.rho.size());
     y_rho << q_rho, s.v.solve(b, g);
@@ -225,13 +229,13 @@ struct Assembly::Solution {
   }
   void add_sparse_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
     const Sparse s = sparse_derivatives();
-    const Index N = 7 * data.n;
+    const Index N = layout.positions();
     MatrixXd b_bar, g_bar, q_bar = y_bar.topRows(N);
     s.v.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
     rho_bar += s.v_b_rho.transpose() * b_bar + s.v_g_rho.transpose() * g_bar;
     for (const SparseEntry& e : s.v_b_q) q_bar.row(e.column) += e.value * b_bar.row(e.row);
-    for (Index i = 0; i < data.n; ++i) {
-      q_bar.middleRows<4>(7 * i + 3) += s.v_g_q[static_cast<std::size_t>(i)].transpose() * g_bar.middleRows<7>(7 * i);
+    for (int i = 1; i <= data.n; ++i) {
+      q_bar.middleRows<4>(layout.p(i)) += s.v_g_q[at(i)].transpose() * g_bar.middleRows<7>(layout.q(i));
     }
     s.q.solve_transposed(q_bar, b_bar, g_bar);
     rho_bar += s.q_b_rho.transpose() * b_bar + s.q_g_rho.transpose() * g_bar;
@@ -273,7 +277,7 @@ struct Assembly::Solution {
     MatrixXd q_b_rho, q_g_rho, v_b_q, v_b_rho, v_g_q, v_g_rho;
   };
   Derivatives derivatives() const {
-    const Index N = 7 * data.n, P = data.rho.size();
+    const Index N = layout.positions(), P = data.rho.size();
     const auto is_free = [](const NearestPoint& point) { return point.linearisation.null_space().cols() > 0; };
     Derivatives d{{}, MatrixXd::Zero(N, P), {}, {}, MatrixXd::Zero(N, N), MatrixXd::Zero(N, P)};
     d.q_b_rho = -position.gradients(result.y).rho;
@@ -286,7 +290,7 @@ struct Assembly::Solution {
     std::vector<Mat<7, 4>> v_guess_q;
     velocity_guess_derivatives(data, q->x, v_guess_q, d.v_g_rho);
     d.v_g_q = -S.y.leftCols(N);
-    for (Index i = 0; i < data.n; ++i) d.v_g_q.block<7, 4>(7 * i, 7 * i + 3) += v_guess_q[static_cast<std::size_t>(i)];
+    for (int i = 1; i <= data.n; ++i) d.v_g_q.block<7, 4>(layout.q(i), layout.p(i)) += v_guess_q[at(i)];
     d.v_g_rho -= S.rho;
     return d;
   }
@@ -295,6 +299,7 @@ struct Assembly::Solution {
   double start;
   Modes modes;
   const MechanismData& data;
+  const StateLayout layout;
   Equilibrium equilibrium;  // set if the scene starts from one
   AssemblyEquations position, velocity;
   std::optional<NearestPoint> q, v;
@@ -313,7 +318,7 @@ MatrixXd Assembly::tangent() const {
   if (!s.result.ok) return MatrixXd::Constant(s.result.y.size(), s.data.rho.size(), kNaN);
   MatrixXd y_rho = MatrixXd::Zero(s.result.y.size(), s.data.rho.size());
   if (s.data.equilibrium) {
-    y_rho.topRows(7 * s.data.n) = s.equilibrium.q_rho;
+    y_rho.topRows(s.layout.positions()) = s.equilibrium.q_rho;
     return y_rho;
   }
   if (s.is_sparse()) return s.sparse_tangent();
@@ -330,7 +335,7 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
     rho_bar.setConstant(kNaN);
     return;
   }
-  const Index N = 7 * s.data.n;
+  const Index N = s.layout.positions();
   if (s.data.equilibrium) {
     rho_bar += s.equilibrium.q_rho.transpose() * y_bar.topRows(N);
     return;
@@ -367,7 +372,7 @@ void note_unmet(const MatrixXd& left, const VectorXd& row_scale, std::initialize
 std::vector<int> Assembly::obstructed() const {
   Solution& s = *solution_;
   if (!s.result.ok) return {};
-  const Index N = 7 * s.data.n, P = s.data.rho.size();
+  const Index N = s.layout.positions(), P = s.data.rho.size();
   std::vector<bool> unmet(static_cast<std::size_t>(P), false);
   if (s.data.equilibrium) {
     const AssemblyEquations::Gradients F = s.position.gradients(s.result.y);
@@ -406,10 +411,10 @@ int Assembly::degrees_of_freedom() const {
 // Takes rows in file order, unit norms first. A row in the span of earlier rows is redundant.
 ModelSummary Assembly::summary() const {
   const MechanismData& d = solution_->data;
-  const int equations = d.m + d.n;
+  const int equations = d.m + d.n, coordinates = static_cast<int>(solution_->layout.positions());
   const auto place = [&](int row) { return row < d.m ? row + d.n : row - d.m; };
   std::vector<SparseEntry> J = solution_->position.sparse_gradients(solution_->result.y).y;
-  std::erase_if(J, [&](const SparseEntry& e) { return e.row >= equations || e.column >= 7 * d.n; });
+  std::erase_if(J, [&](const SparseEntry& e) { return e.row >= equations || e.column >= coordinates; });
   for (SparseEntry& e : J) e.row = place(e.row);
   const RowDependence found = row_dependence(equations, d.n, 7, J, NearestPointLinearisation::kRankThreshold);
   const std::size_t joints = d.joint_names.size();
@@ -428,7 +433,7 @@ ModelSummary Assembly::summary() const {
   summary.bodies = d.n;
   summary.equations = equations;
   summary.rank = found.rank;
-  summary.degrees_of_freedom = 7 * d.n - summary.rank;
+  summary.degrees_of_freedom = coordinates - summary.rank;
   for (std::size_t j = 0; j < rows.size(); ++j) {
     if (redundant[j] == 0) continue;
     summary.redundant.push_back((j < joints ? d.joint_names[j] : d.drive_names[j - joints]) + " (" +

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <span>
 
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/sensor/body_at.hpp"
@@ -54,16 +55,16 @@ struct PrimitiveBars {
 
 BodyAt at_rest(const VectorXd& y, int body) {
   BodyAt b;
-  if (body > 0) set_position(y.segment<7>(7 * (body - 1)), b.state, b.frame);
+  if (body > 0) set_position(y.segment<7>(StateLayout::of(y).q(body)), b.state, b.frame);
   return b;
 }
 
 // The part of a pull-back that lies in q.
-void add_to_row(const BodyAt& b, int body, const FrameBar& bar, AssemblyEquations::Row row) {
+void add_to_row(const BodyAt& b, const StateLayout& layout, int body, const FrameBar& bar, AssemblyEquations::Row row) {
   if (body == 0) return;
   Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
   add_pull_back_velocity(b.state, bar, 1, q_bar, v_bar);
-  row.segment<7>(7 * (body - 1)) += q_bar.transpose();
+  row.segment<7>(layout.q(body)) += q_bar.transpose();
 }
 
 }  // namespace
@@ -203,11 +204,12 @@ VectorXd AssemblyEquations::values(const VectorXd& y) const {
   } else {
     laws_.subtract_f_t(F);
   }
-  for (int i = 0; i < data_.n; ++i) {
-    const Vector4d p = y.segment<4>(7 * i + 3), pdot = y.segment<4>(y.size() / 2 + 7 * i + 3);
-    F(data_.m + i) = level_ == AssemblyLevel::position ? UnitNorm::phi(p) : UnitNorm::phi_dot(p, pdot);
+  const StateLayout layout{data_.n};
+  Index row = data_.m;
+  for (int i = 1; i <= data_.n; ++i) {
+    const Vector4d p = y.segment<4>(layout.p(i)), pdot = y.segment<4>(layout.pdot(i));
+    F(row++) = level_ == AssemblyLevel::position ? UnitNorm::phi(p) : UnitNorm::phi_dot(p, pdot);
   }
-  Index row = data_.m + data_.n;
   for (const AssemblyTarget& target : targets_) {
     F(row++) = evaluate(data_, target.sensor, t_, y, branches(target)) - target.value;
   }
@@ -243,15 +245,15 @@ AssemblyEquations::SparseGradients AssemblyEquations::sparse_gradients(const Vec
 template <class AddEntry>
 void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd* rho) const {
   const bool positions = level_ == AssemblyLevel::position;
-  const Index half = y.size() / 2;
+  const StateLayout layout{data_.n};
   if (rho) *rho = MatrixXd::Zero(rows(), data_.rho.size());
   const auto add_body = [&](Index row, const BodyAt& b, int body, const FrameBar& bar) {
     if (body == 0) return;
     Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
     add_pull_back_velocity(b.state, bar, 1, q_bar, v_bar);
     for (Index k = 0; k < 7; ++k) {
-      add(row, 7 * (body - 1) + k, q_bar(k));
-      add(row, half + 7 * (body - 1) + k, v_bar(k));
+      add(row, layout.q(body) + k, q_bar(k));
+      add(row, layout.v(body) + k, v_bar(k));
     }
   };
   for (const Constraint& c : data_.constraints) {
@@ -282,15 +284,15 @@ void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, Mat
         c.primitive);
   }
   if (rho) add_law_gradients(*rho);
-  for (int i = 0; i < data_.n; ++i) {
-    const Index p = 7 * i + 3, pdot = half + p;
+  Index row = data_.m;
+  for (int i = 1; i <= data_.n; ++i, ++row) {
+    const Index p = layout.p(i), pdot = layout.pdot(i);
     for (Index k = 0; k < 4; ++k) {
-      add(data_.m + i, p + k, 2 * y(positions ? p + k : pdot + k));
-      if (!positions) add(data_.m + i, pdot + k, 2 * y(p + k));
+      add(row, p + k, 2 * y(positions ? p + k : pdot + k));
+      if (!positions) add(row, pdot + k, 2 * y(p + k));
     }
   }
   VectorXd y_bar(y.size()), rho_bar(data_.rho.size());
-  Index row = data_.m + data_.n;
   for (const AssemblyTarget& target : targets_) {
     y_bar.setZero(), rho_bar.setZero();
     add_gradient(data_, target.sensor, t_, y, branches(target), 1, y_bar, rho_bar);
@@ -317,16 +319,17 @@ AssemblyEquations::Gradients AssemblyEquations::second(const VectorXd& y, const 
   const Index N = y.size() / 2;
   Gradients out{MatrixXd::Zero(N, y.size()), MatrixXd::Zero(N, data_.rho.size())};
   add_joint_curvature(y, nu, out);
-  for (int i = 0; i < data_.n; ++i) {
-    const Index p = 7 * i + 3;
-    out.y.block<4, 4>(p, p).diagonal().array() += 2 * nu(data_.m + i);
+  const StateLayout layout{data_.n};
+  Index row = data_.m;
+  for (int i = 1; i <= data_.n; ++i) {
+    out.y.block<4, 4>(layout.p(i), layout.p(i)).diagonal().array() += 2 * nu(row++);
   }
-  Index row = data_.m + data_.n;
   for (const AssemblyTarget& target : targets_) add_target_curvature(target, y, nu(row++), out);
   return out;
 }
 
 void AssemblyEquations::add_joint_curvature(const VectorXd& y, const VectorXd& nu, Gradients& out) const {
+  const StateLayout layout{data_.n};
   for (const Constraint& c : data_.constraints) {
     for (const int moving : {c.body1, c.body2}) {
       if (moving == 0) continue;
@@ -334,7 +337,7 @@ void AssemblyEquations::add_joint_curvature(const VectorXd& y, const VectorXd& n
         BodyAt b1 = at_rest(y, c.body1), b2 = at_rest(y, c.body2);
         BodyAt& b = moving == c.body1 ? b1 : b2;
         set_velocity(Vec<7>::Unit(k), b.state, b.frame);
-        const Index j = 7 * (moving - 1) + k;
+        const Index j = layout.q(moving) + k;
         PrimitiveBars bars;
         std::visit(
             [&](const auto& p) {
@@ -347,8 +350,8 @@ void AssemblyEquations::add_joint_curvature(const VectorXd& y, const VectorXd& n
               add_slot(c.slot_factor, Vec<1>(nu(c.row) * rate(0)), out.rho.row(j));
             },
             c.primitive);
-        add_to_row(b1, c.body1, bars.bar1, out.y.row(j));
-        add_to_row(b2, c.body2, bars.bar2, out.y.row(j));
+        add_to_row(b1, layout, c.body1, bars.bar1, out.y.row(j));
+        add_to_row(b2, layout, c.body2, bars.bar2, out.y.row(j));
         add_slot(c.slot1, bars.s.s1, out.rho.row(j));
         add_slot(c.slot2, bars.s.s2, out.rho.row(j));
         add_slot(c.slot3, bars.s.s3, out.rho.row(j));

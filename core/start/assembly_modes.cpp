@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
@@ -51,8 +52,9 @@ double distance(const VectorXd& a, const VectorXd& b) {
 // Whether a joint holds only because an axis or a normal is opposite to that in the first mode. Two or more dot
 // products of a joint prevent a motion between the two.
 bool is_inside_out(const MechanismData& d, const VectorXd& first, const VectorXd& q) {
-  const auto axes = [](const VectorXd& at, int body) {
-    return body == 0 ? Matrix3d(Matrix3d::Identity()) : Matrix3d(A(Vector4d(at.segment<4>(7 * (body - 1) + 3))));
+  const StateLayout layout{d.n};
+  const auto axes = [&](const VectorXd& at, int body) {
+    return body == 0 ? Matrix3d(Matrix3d::Identity()) : Matrix3d(A(Vector4d(at.segment<4>(layout.p(body)))));
   };
   std::vector<int> products(d.joint_names.size(), 0);
   for (const Constraint& c : d.constraints)
@@ -178,15 +180,16 @@ std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, c
 
 void set_guess(Scene& scene, const Mechanism& mechanism, const AssemblyMode& mode) {
   const MechanismData& d = mechanism.data();
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    Body& body = scene.bodies[i];
-    const BodyData& given = d.bodies[i + 1];
-    const Vec<7> q = mode.q.segment<7>(7 * static_cast<Index>(i));
+  const StateLayout layout{d.n};
+  std::size_t k = 0;
+  for (Body& body : scene.bodies) {
+    const BodyData& given = d.bodies[++k];
+    const Vec<7> q = mode.q.segment<7>(layout.q(k));
     const Vector4d p0 = given.q.tail<4>(), p = q.tail<4>();
     const Vector3d r0 = given.q.head<3>() - A(p0) * given.com, r = q.head<3>() - A(p) * given.com;  // of the origin
-    for (Index k = 0; k < 3; ++k) {
-      Field& x = body.position[static_cast<std::size_t>(k)];
-      x = x.is_number() ? Field(r(k)) : Field(x + Expression(r(k) - r0(k)));
+    for (Index i = 0; i < 3; ++i) {
+      Field& x = body.position[static_cast<std::size_t>(i)];
+      x = x.is_number() ? Field(r(i)) : Field(x + Expression(r(i) - r0(i)));
     }
     Vector4d inverse = p0;
     inverse.tail<3>() *= -1;

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
+
 namespace mbsopt {
 
 using Eigen::Index;
@@ -9,8 +11,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 VectorXd position_guess(const MechanismData& d) {
-  VectorXd q(7 * d.n);
-  for (int i = 0; i < d.n; ++i) q.segment<7>(7 * i) = d.bodies[static_cast<std::size_t>(i + 1)].q;
+  const StateLayout layout{d.n};
+  VectorXd q(layout.positions());
+  for (std::size_t k = 1; k < d.bodies.size(); ++k) q.segment<7>(layout.q(k)) = d.bodies[k].q;
   return q;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -33,8 +34,9 @@ void DrivenPath::improve(const Eigen::VectorXd& y) { state_.y = y; }
 
 double DrivenPath::step_limit() const {
   double fastest = 0;
-  for (int i = 0; i < mechanism_.bodies(); ++i) {
-    fastest = std::max(fastest, state_.y.segment<4>(7 * (mechanism_.bodies() + i) + 3).lpNorm<Eigen::Infinity>());
+  const StateLayout layout{mechanism_.bodies()};
+  for (int i = 1; i <= layout.n; ++i) {
+    fastest = std::max(fastest, state_.y.segment<4>(layout.pdot(i)).lpNorm<Eigen::Infinity>());
   }
   return fastest > 0 ? kLargestTurn / fastest : INFINITY;
 }
@@ -91,8 +93,9 @@ bool DrivenPath::keeps_branch(double h) const {
     return (q1 - y_hat_.segment(at, size)).lpNorm<Eigen::Infinity>() <= allowed &&
            (q1 - q0 - 0.5 * h * (v0 + v1)).lpNorm<Eigen::Infinity>() <= allowed;
   };
-  for (int i = 0; i < mechanism_.bodies(); ++i) {
-    if (!keeps(7 * i, 3) || !keeps(7 * i + 3, 4)) return false;
+  const StateLayout layout{mechanism_.bodies()};
+  for (int i = 1; i <= layout.n; ++i) {
+    if (!keeps(layout.q(i), 3) || !keeps(layout.p(i), 4)) return false;
   }
   return true;
 }

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/force/forces.hpp"
@@ -34,69 +35,67 @@ class Statics {
   Statics(const Mechanism& mechanism, double t, const VectorXd& q_guess, const VectorXd& angles)
       : d_(mechanism.data()),
         t_(t),
-        n_(d_.n),
+        layout_{d_.n},
         dynamics_(mechanism, FormulationSettings{}),
         projector_(make_projector(mechanism, Projection::position_velocity)),
         equations_(d_, AssemblyLevel::position, t),
         angles_(angles),
-        ydot_(14 * n_) {
+        ydot_(layout_.size()) {
     dynamics_.terms().hold_laws();
-    VectorXd y = VectorXd::Zero(14 * n_);
-    y.head(7 * n_) = q_guess;
-    length_ = length_at(y);
+    length_ = length_at(at_rest_in(q_guess));
   }
 
   // q_dir = T(p) xi, columns
   MatrixXd to_q(const VectorXd& q, const MatrixXd& xi) const {
-    MatrixXd out(7 * n_, xi.cols());
-    for (Index i = 0; i < n_; ++i) {
-      const Vector4d p = q.segment<4>(7 * i + 3);
+    MatrixXd out(layout_.positions(), xi.cols());
+    for (int i = 1; i <= d_.n; ++i) {
+      const Vector4d p = q.segment<4>(layout_.p(i));
       for (Index k = 0; k < xi.cols(); ++k) {
-        out.col(k).segment<3>(7 * i) = xi.col(k).segment<3>(6 * i);
-        out.col(k).segment<4>(7 * i + 3) = 0.5 * G_transposed_times(p, xi.col(k).segment<3>(6 * i + 3));
+        const Vec<6> of_body = xi.col(k).segment<6>(layout_.z(i));
+        out.col(k).segment<3>(layout_.q(i)) = of_body.head<3>();
+        out.col(k).segment<4>(layout_.p(i)) = 0.5 * G_transposed_times(p, of_body.tail<3>());
       }
     }
     return out;
   }
 
   bool evaluate(const VectorXd& q) {
-    y_ = VectorXd::Zero(14 * n_);
-    y_.head(7 * n_) = q;
+    y_ = at_rest_in(q);
     if (!dynamics_.evaluate(t_, y_, angles_, ydot_)) return false;
     dynamics_.linearise_here();
-    z_.resize(6 * n_);
-    for (Index i = 0; i < n_; ++i) z_.segment<6>(6 * i) = dynamics_.z()[static_cast<std::size_t>(i)];
+    z_.resize(freedoms_);
+    Index row = 0;
+    for (const Vec<6>& z : dynamics_.z()) z_.segment<6>(row) = z, row += 6;
     return z_.allFinite();
   }
 
   // Tangents of z: in the directions xi (6n x 6n identity), and in the parameters.
   MatrixXd z_of_positions() {
-    const MatrixXd directions = to_q(y_.head(7 * n_), MatrixXd::Identity(6 * n_, 6 * n_));
-    MatrixXd out(6 * n_, 6 * n_);
+    const MatrixXd directions = to_q(y_.head(layout_.positions()), MatrixXd::Identity(freedoms_, freedoms_));
+    MatrixXd out(freedoms_, freedoms_);
     const ParameterBlock none = block_without_parameters(d_);
-    LaneRows y_dir(14 * n_, kLanes), ydot_dir(14 * n_, kLanes);
-    for (Index first = 0; first < 6 * n_; first += kLanes) {
+    LaneRows y_dir(layout_.size(), kLanes), ydot_dir(layout_.size(), kLanes);
+    for (Index first = 0; first < freedoms_; first += kLanes) {
       y_dir.setZero();
-      const Index lanes = std::min<Index>(kLanes, 6 * n_ - first);
-      y_dir.topLeftCorner(7 * n_, lanes) = directions.middleCols(first, lanes);
+      const Index lanes = std::min<Index>(kLanes, freedoms_ - first);
+      y_dir.topLeftCorner(layout_.positions(), lanes) = directions.middleCols(first, lanes);
       dynamics_.tangent(none, y_dir, ydot_dir);
-      for (Index i = 0; i < n_; ++i) {
-        out.block(6 * i, first, 6, lanes) = dynamics_.z_tangent()[static_cast<std::size_t>(i)].leftCols(lanes);
-      }
+      Index row = 0;
+      for (const Lanes<6>& z : dynamics_.z_tangent()) out.block(row, first, 6, lanes) = z.leftCols(lanes), row += 6;
     }
     return out;
   }
   MatrixXd z_of_parameters() {
-    MatrixXd out = MatrixXd::Zero(6 * n_, d_.rho.size());
-    const LaneRows y_dir = LaneRows::Zero(14 * n_, kLanes);
-    LaneRows ydot_dir(14 * n_, kLanes);
+    MatrixXd out = MatrixXd::Zero(freedoms_, d_.rho.size());
+    const LaneRows y_dir = LaneRows::Zero(layout_.size(), kLanes);
+    LaneRows ydot_dir(layout_.size(), kLanes);
     for (const ParameterBlock& block : parameter_blocks(d_)) {
       dynamics_.tangent(block, y_dir, ydot_dir);
       for (int lane = 0; lane < kLanes; ++lane) {
         if (block.parameter[lane] < 0) continue;
-        for (Index i = 0; i < n_; ++i) {
-          out.col(block.parameter[lane]).segment<6>(6 * i) =
-              dynamics_.z_tangent()[static_cast<std::size_t>(i)].col(lane);
+        Index row = 0;
+        for (const Lanes<6>& z : dynamics_.z_tangent()) {
+          out.col(block.parameter[lane]).segment<6>(row) = z.col(lane), row += 6;
         }
       }
     }
@@ -116,13 +115,14 @@ class Statics {
   Rows rows() {
     Rows r;
     if (d_.m == 0) {
-      r.J.resize(0, 6 * n_), r.phi_rho.resize(0, d_.rho.size());
-      r.N.setIdentity(6 * n_, 6 * n_);
+      r.J.resize(0, freedoms_), r.phi_rho.resize(0, d_.rho.size());
+      r.N.setIdentity(freedoms_, freedoms_);
       return r;
     }
     equations_.start_branches(y_);
     const AssemblyEquations::Gradients g = equations_.gradients(y_);
-    r.J = g.y.topLeftCorner(d_.m, 7 * n_) * to_q(y_.head(7 * n_), MatrixXd::Identity(6 * n_, 6 * n_));
+    r.J = g.y.topLeftCorner(d_.m, layout_.positions()) *
+          to_q(y_.head(layout_.positions()), MatrixXd::Identity(freedoms_, freedoms_));
     r.phi_rho = g.rho.topRows(d_.m);
     r.scale = r.J.rowwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
     r.J_scaled = OrthogonalDecomposition(r.scale.asDiagonal() * r.J, kRestRankThreshold);
@@ -132,21 +132,22 @@ class Statics {
 
   MatrixXd mass_times(const MatrixXd& x) const {
     MatrixXd out(x.rows(), x.cols());
-    for (Index i = 0; i < n_; ++i) {
-      const BodyData& b = d_.bodies[static_cast<std::size_t>(i + 1)];
-      out.middleRows(6 * i, 3) = b.mass * x.middleRows(6 * i, 3);
-      out.middleRows(6 * i + 3, 3) = b.J * x.middleRows(6 * i + 3, 3);
+    for (int i = 1; i <= d_.n; ++i) {
+      const BodyData& b = d_.bodies[at(i)];
+      const Index r = layout_.z(i), theta = r + 3;
+      out.middleRows(r, 3) = b.mass * x.middleRows(r, 3);
+      out.middleRows(theta, 3) = b.J * x.middleRows(theta, 3);
     }
     return out;
   }
 
   // Moves q back onto the constraints.
   bool settle(VectorXd& q) {
-    VectorXd y_hat = VectorXd::Zero(14 * n_), y(14 * n_);
-    y_hat.head(7 * n_) = q;
+    const VectorXd y_hat = at_rest_in(q);
+    VectorXd y(layout_.size());
     ProjectionSolution solution = projector_->solution();
     if (!projector_->project(t_, angles_, y_hat, y, solution)) return false;
-    q = y.head(7 * n_);
+    q = y.head(layout_.positions());
     for (std::size_t k = 0; k < d_.angles.size(); ++k) {
       const JointAngle& a = d_.angles[k];
       double& angle = angles_(static_cast<Index>(k));
@@ -163,9 +164,10 @@ class Statics {
   // The largest part of xi, in lengths of the mechanism and rad.
   double size_of(const VectorXd& xi) const {
     double size = 0;
-    for (Index i = 0; i < n_; ++i) {
-      size = std::max({size, xi.segment<3>(6 * i).lpNorm<Eigen::Infinity>() / length_,
-                       xi.segment<3>(6 * i + 3).lpNorm<Eigen::Infinity>()});
+    for (int i = 1; i <= d_.n; ++i) {
+      const Index r = layout_.z(i), theta = r + 3;
+      size = std::max(
+          {size, xi.segment<3>(r).lpNorm<Eigen::Infinity>() / length_, xi.segment<3>(theta).lpNorm<Eigen::Infinity>()});
     }
     return xi.allFinite() ? size : INFINITY;
   }
@@ -180,6 +182,13 @@ class Statics {
   }
 
  private:
+  // y = (q, 0)
+  VectorXd at_rest_in(const VectorXd& q) const {
+    VectorXd y = VectorXd::Zero(layout_.size());
+    y.head(layout_.positions()) = q;
+    return y;
+  }
+
   // The longest arm of a joint, span of a spring or distance of a body from the first; 1 m if there is none.
   double length_at(const VectorXd& y) const {
     double length = 0;
@@ -191,13 +200,14 @@ class Statics {
     for (const TsdaForce& f : d_.forces->of<TsdaForce>()) {
       length = std::max(length, f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l);
     }
-    for (Index i = 1; i < n_; ++i) length = std::max(length, (y.segment<3>(7 * i) - y.head<3>()).norm());
+    for (int i = 2; i <= d_.n; ++i) length = std::max(length, (y.segment<3>(layout_.q(i)) - y.head<3>()).norm());
     return length > 0 ? length : 1;
   }
 
   const MechanismData& d_;
   double t_;
-  Index n_;
+  const StateLayout layout_;
+  const Index freedoms_ = 6 * layout_.n;  // of the bodies without joints
   double length_ = 1;
   SpatialDynamics dynamics_;
   std::unique_ptr<Projector> projector_;

@@ -23,6 +23,7 @@
 #include <map>
 #include <numeric>
 
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/dynamics/constraint_rows.hpp"
 #include "core/expression/counted.hpp"
@@ -43,8 +44,6 @@ constexpr double kStep = 1e-3;  // to the position near by [rad]: far above kZer
 constexpr double kZero = 1e-6;  // of a motion's size: above the rounding of a null vector
 constexpr std::size_t kMostNames = 8;  // in one sentence
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 struct JointPoint {
   std::string joint;
   Vector3d place;  // global [m]
@@ -53,9 +52,9 @@ struct JointPoint {
 class MotionNames {
  public:
   MotionNames(const MechanismData& data, const VectorXd& y)
-      : d_(data), frames_(at(data.n) + 1), points_(frames_.size()) {
+      : d_(data), layout_{data.n}, frames_(at(data.n) + 1), points_(frames_.size()) {
     BodyState state;
-    for (int i = 1; i <= d_.n; ++i) set_position(y.segment<7>(7 * (i - 1)), state, frames_[at(i)]);
+    for (std::size_t k = 1; k < frames_.size(); ++k) set_position(y.segment<7>(layout_.q(k)), state, frames_[k]);
     set_jacobian();
     for (const Constraint& c : d_.constraints) add_points(c);
   }
@@ -82,13 +81,13 @@ class MotionNames {
 
   // d(q)/d(s) along a general motion of all groups: at most one radian, or one metre if nothing turns.
   VectorXd general_motion(const VectorXd& y) const {
-    VectorXd qdot = VectorXd::Zero(7 * d_.n);
+    VectorXd qdot = VectorXd::Zero(layout_.positions());
     double fastest = 0, turning = 0;
     for (const std::vector<int>& group : groups()) {
       const MatrixXd N = free_in(columns_of(group));
       const VectorXd weights = VectorXd::LinSpaced(N.cols(), 1, 2), motion = N * weights;
       for (std::size_t k = 0; k < group.size(); ++k) {
-        const Index q = 7 * (group[k] - 1);
+        const Index q = layout_.q(group[k]);
         const Vector3d v = motion.segment<3>(6 * static_cast<Index>(k)),
                        omega = motion.segment<3>(6 * static_cast<Index>(k) + 3), e = y.segment<3>(q + 4);
         qdot.segment<3>(q) = v;
@@ -116,7 +115,7 @@ class MotionNames {
     const MatrixXd y = free_before.cols() == 0 ? MatrixXd(MatrixXd::Identity(rows.rows(), rows.rows()))
                                                : free_in(without_rounding((rows * free_before).transpose()));
     if (y.cols() == 0) return {};
-    const MatrixXd wrench = rows.middleCols<6>(6 * (body - 1)).transpose() * y;
+    const MatrixXd wrench = rows.middleCols<6>(layout_.z(body)).transpose() * y;
     Vector3d arm = Vector3d::Zero();  // from the joint to the centre of mass, to which moments refer
     for (const JointPoint& point : points_[at(body)])
       if (point.joint == d_.joint_names[at(joint)]) arm = frames_[at(body)].r - point.place;
@@ -149,8 +148,8 @@ class MotionNames {
     rows.evaluate(frames_);
     for (const RowGroup& g : d_.groups) {
       for (int r = 0; r < g.rows; ++r) {
-        if (g.body1 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body1 - 1)) += rows.J1.row(g.block + r);
-        if (g.body2 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body2 - 1)) += rows.J2.row(g.block + r);
+        if (g.body1 > 0) J_.block<1, 6>(g.row + r, layout_.z(g.body1)) += rows.J1.row(g.block + r);
+        if (g.body2 > 0) J_.block<1, 6>(g.row + r, layout_.z(g.body2)) += rows.J2.row(g.block + r);
       }
     }
     for (Index r = 0; r < J_.rows(); ++r) {
@@ -198,7 +197,7 @@ class MotionNames {
   MatrixXd columns_of(const std::vector<int>& bodies) const {
     MatrixXd columns(J_.rows(), 6 * static_cast<Index>(bodies.size()));
     for (std::size_t k = 0; k < bodies.size(); ++k)
-      columns.middleCols<6>(6 * static_cast<Index>(k)) = J_.middleCols<6>(6 * (bodies[k] - 1));
+      columns.middleCols<6>(6 * static_cast<Index>(k)) = J_.middleCols<6>(layout_.z(bodies[k]));
     return columns;
   }
   static MatrixXd free_in(const MatrixXd& J) {
@@ -288,6 +287,7 @@ class MotionNames {
   std::string name(int body) const { return "'" + d_.body_names[at(body)] + "'"; }
 
   const MechanismData& d_;
+  const StateLayout layout_;
   std::vector<Frame> frames_;                    // [0] is the ground
   std::vector<std::vector<JointPoint>> points_;  // by body
   MatrixXd J_;
@@ -300,7 +300,7 @@ bool close_again(const MechanismData& data, double time, VectorXd& y) {
   constexpr double kClosed = 1e-12;  // [m], 1: rounding
   AssemblyEquations equations(data, AssemblyLevel::position, time);
   equations.start_branches(y);
-  const Index rows = data.m + data.n, N = 7 * data.n;
+  const Index rows = data.m + data.n, N = StateLayout{data.n}.positions();
   for (int i = 0; i < kSteps; ++i) {
     const VectorXd F = equations.values(y).head(rows);
     if (F.lpNorm<Eigen::Infinity>() < kClosed) return true;
@@ -319,7 +319,7 @@ std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly
   const VectorXd& y = assembly.result().y;
   MotionNames here(data, y);
   VectorXd moved = y;
-  moved.head(7 * data.n) += kStep * here.general_motion(y);
+  moved.head(StateLayout{data.n}.positions()) += kStep * here.general_motion(y);
   if (!close_again(data, start_time, moved)) return {};
   const MotionNames::Told at_start = here.told(), near_by = MotionNames(data, moved).told();
   if (at_start.all != degrees_of_freedom || near_by.all != degrees_of_freedom) return {};

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/linear/dense.hpp"
@@ -33,10 +34,10 @@ class DrivenRows {
 
   void set(double t, const VectorXd& y) {
     laws_.set_time(t);
-    for (int i = 1; i <= d_.n; ++i) {
-      const std::size_t k = static_cast<std::size_t>(i);
-      set_position(y.segment<7>(7 * (i - 1)), states_[k], frames_[k]);
-      set_velocity(y.segment<7>(7 * (d_.n + i - 1)), states_[k], frames_[k]);
+    const StateLayout layout{d_.n};
+    for (std::size_t k = 1; k < states_.size(); ++k) {
+      set_position(y.segment<7>(layout.q(k)), states_[k], frames_[k]);
+      set_velocity(y.segment<7>(layout.v(k)), states_[k], frames_[k]);
     }
   }
   void factor() {
@@ -96,13 +97,14 @@ class DrivenMotion final : public MotionSource {
     std::vector<Vec<6>> loads = dynamics_.loads();
     VectorXd left(6 * d_.n);  // f - M z - J'lambda
     motion_.lambda = solved && dynamics_.lambda().allFinite() ? dynamics_.lambda() : VectorXd::Zero(d_.m);
+    const StateLayout layout{d_.n};
     for (int i = 1; i <= d_.n; ++i) {
-      const std::size_t k = static_cast<std::size_t>(i - 1);
-      motion_.z[k] = z.segment<6>(6 * (i - 1));
-      left.segment<6>(6 * (i - 1)) = -dynamics_.solver().mass_times(i, motion_.z[k]);
+      Vec<6>& of_body = motion_.z[static_cast<std::size_t>(i - 1)];
+      of_body = z.segment<6>(layout.z(i));
+      left.segment<6>(layout.z(i)) = -dynamics_.solver().mass_times(i, of_body);
     }
     dynamics_.terms().add_user_mass(-1, motion_.z, loads);
-    for (int i = 1; i <= d_.n; ++i) left.segment<6>(6 * (i - 1)) += loads[static_cast<std::size_t>(i - 1)];
+    for (int i = 1; i <= d_.n; ++i) left.segment<6>(layout.z(i)) += loads[static_cast<std::size_t>(i - 1)];
     motion_.lambda += rows_.solve_transposed(left - rows_.transposed_times(motion_.lambda));
     return motion_;
   }
@@ -177,25 +179,27 @@ class Kinematics {
       move(rows_.solve(-phi));
     }
     const VectorXd u = rows_.solve(-rows_.phi_dot());
-    const Index half = 7 * d_.n;
-    for (int i = 0; i < d_.n; ++i) {
-      y_.segment<3>(half + 7 * i) += u.segment<3>(6 * i);
-      y_.segment<4>(half + 7 * i + 3) +=
-          0.5 * G_transposed_times(Vector4d(y_.segment<4>(7 * i + 3)), u.segment<3>(6 * i + 3));
+    const StateLayout layout{d_.n};
+    for (int i = 1; i <= d_.n; ++i) {
+      const Vec<6> of_body = u.segment<6>(layout.z(i));
+      y_.segment<3>(layout.v(i)) += of_body.head<3>();
+      y_.segment<4>(layout.pdot(i)) +=
+          0.5 * G_transposed_times(Vector4d(y_.segment<4>(layout.p(i))), of_body.tail<3>());
     }
     path_.improve(y_);
   }
   void move(const VectorXd& delta) {
-    const Index half = 7 * d_.n;
-    for (int i = 0; i < d_.n; ++i) {
-      y_.segment<3>(7 * i) += delta.segment<3>(6 * i);
-      Vector4d p = y_.segment<4>(7 * i + 3);
-      p += 0.5 * G_transposed_times(p, delta.segment<3>(6 * i + 3));
+    const StateLayout layout{d_.n};
+    for (int i = 1; i <= d_.n; ++i) {
+      const Vec<6> of_body = delta.segment<6>(layout.z(i));
+      y_.segment<3>(layout.q(i)) += of_body.head<3>();
+      Vector4d p = y_.segment<4>(layout.p(i));
+      p += 0.5 * G_transposed_times(p, of_body.tail<3>());
       p.normalize();
-      Vector4d pdot = y_.segment<4>(half + 7 * i + 3);
+      Vector4d pdot = y_.segment<4>(layout.pdot(i));
       pdot -= p * p.dot(pdot);
-      y_.segment<4>(7 * i + 3) = p;
-      y_.segment<4>(half + 7 * i + 3) = pdot;
+      y_.segment<4>(layout.p(i)) = p;
+      y_.segment<4>(layout.pdot(i)) = pdot;
     }
   }
 

@@ -19,6 +19,7 @@
 #include "core/mechanism/planar_model.hpp"
 #include "core/mechanism/reaction_sensor.hpp"
 #include "core/sensor/body_at.hpp"
+#include "core/start/assembly_problems.hpp"
 
 namespace mbsopt {
 namespace {
@@ -33,18 +34,20 @@ constexpr double kModelRankThreshold = 1e-8;  // rows of J scaled to unit length
 std::vector<Frame> frames_at(const MechanismData& d, const VectorXd& q) {
   std::vector<Frame> frames(at(d.n) + 1);
   BodyState state;
-  for (int i = 1; i <= d.n; ++i) set_position(q.segment<7>(7 * (i - 1)), state, frames[at(i)]);
+  const StateLayout layout{d.n};
+  for (std::size_t k = 1; k < frames.size(); ++k) set_position(q.segment<7>(layout.q(k)), state, frames[k]);
   return frames;
 }
 
 void add_jacobian(const MechanismData& d, const VectorXd& q, std::vector<SparseEntry>& rows) {
+  const StateLayout layout{d.n};
   ConstraintRows J(d);
   J.evaluate(frames_at(d, q));
   for (const RowGroup& g : d.groups) {
     for (int r = 0; r < g.rows; ++r) {
       for (int k = 0; k < 6; ++k) {
-        if (g.body1 > 0) rows.push_back({g.row + r, 6 * (g.body1 - 1) + k, J.J1(g.block + r, k)});
-        if (g.body2 > 0) rows.push_back({g.row + r, 6 * (g.body2 - 1) + k, J.J2(g.block + r, k)});
+        if (g.body1 > 0) rows.push_back({g.row + r, static_cast<int>(layout.z(g.body1)) + k, J.J1(g.block + r, k)});
+        if (g.body2 > 0) rows.push_back({g.row + r, static_cast<int>(layout.z(g.body2)) + k, J.J2(g.block + r, k)});
       }
     }
   }
@@ -53,11 +56,12 @@ void add_jacobian(const MechanismData& d, const VectorXd& q, std::vector<SparseE
 // Directions that neither a joint nor a mass holds: no row of J and no row of the masses, one per principal axis,
 // reaches them. For each body: whether it may turn, or only move.
 std::map<int, bool> massless_directions(const MechanismData& d, const VectorXd& q) {
+  const StateLayout layout{d.n};
   std::vector<SparseEntry> rows;
   int count = d.m;
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& b = d.bodies[at(i)];
-    const int first = 6 * (i - 1);
+    const int first = static_cast<int>(layout.z(i));
     for (int k = 0; k < 3 && b.mass > 0; ++k) rows.push_back({count++, first + k, 1});
     const SymmetricEigen principal = symmetric_eigen(b.J);
     for (int k = 0; k < 3; ++k) {
@@ -223,7 +227,8 @@ void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::st
       if (body > 0) arm = std::max(arm, s.norm());
     });
   }
-  for (int i = 0; i < d.n; ++i) far = std::max(far, q.segment<3>(7 * i).stableNorm());
+  const StateLayout layout{d.n};
+  for (int i = 1; i <= d.n; ++i) far = std::max(far, q.segment<3>(layout.q(i)).stableNorm());
   const double rounding = std::numeric_limits<double>::epsilon() * far;
   if (arm == 0 || !(rounding > kNoticeable * arm)) return;
   warnings.push_back(fmt::format(
@@ -237,9 +242,7 @@ void add_violations(const MechanismData& d, std::vector<std::string>& warnings) 
   for (const Constraint& c : d.constraints) {
     if (const auto* p = std::get_if<Coincidence>(&c.primitive)) size = std::max({size, p->s1.norm(), p->s2.norm()});
   }
-  VectorXd q(7 * d.n);
-  for (int i = 1; i <= d.n; ++i) q.segment<7>(7 * (i - 1)) = d.bodies[at(i)].q;
-  const std::vector<Frame> frames = frames_at(d, q);
+  const std::vector<Frame> frames = frames_at(d, position_guess(d));
   std::map<int, double> worst_point, worst_axis;
   for (const Constraint& c : d.constraints) {
     if (c.joint < 0) continue;
@@ -288,7 +291,8 @@ std::vector<int> massless_bodies(const Mechanism& mechanism, const Assembly& ass
 
 std::vector<int> massless_bodies(const MechanismData& data, const VectorXd& y) {
   std::vector<int> bodies;
-  for (const auto& [body, turns] : massless_directions(data, y.head(7 * data.n))) bodies.push_back(body);
+  for (const auto& [body, turns] : massless_directions(data, y.head(StateLayout{data.n}.positions())))
+    bodies.push_back(body);
   return bodies;
 }
 
@@ -296,8 +300,9 @@ std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assemb
   const MechanismData& d = mechanism.data();
   std::vector<std::string> warnings;
   if (!assembly.result().ok) return warnings;
-  add_rounding(d, assembly.result().y.head(7 * d.n), warnings);
-  add_massless(d, assembly.result().y.head(7 * d.n), warnings);
+  const VectorXd q = assembly.result().y.head(StateLayout{d.n}.positions());
+  add_rounding(d, q, warnings);
+  add_massless(d, q, warnings);
   add_springs(d, assembly.result().y, warnings);
   add_reactions(mechanism, assembly.result(), warnings);
   return warnings;

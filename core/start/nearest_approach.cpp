@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/sensor/body_at.hpp"
@@ -16,7 +17,7 @@ NearestApproach::NearestApproach(const Mechanism& mechanism, double start_time)
                                 mechanism.data().planar ? Model::planar : Model::spatial, Free::nothing)),
       y_(Eigen::VectorXd::Zero(mechanism.states())) {
   const MechanismData& d = mechanism_.data();
-  y_.head(7 * d.n) = position_guess(d);
+  y_.head(StateLayout{d.n}.positions()) = position_guess(d);
   AssemblyEquations equations(d, AssemblyLevel::position, start_time);
   equations.start_branches(y_);
   angles_ = equations.angles();

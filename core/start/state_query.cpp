@@ -141,8 +141,9 @@ MatrixXd StateQuery::M() const {
 VectorXd StateQuery::to_coordinates(const std::vector<Vec<6>>& loads) const {
   const StateLayout layout{data_.n};
   VectorXd out(a_.size());
-  for (int i = 1; i <= data_.n; ++i) {
-    const Vec<6>& load = loads[static_cast<std::size_t>(i - 1)];
+  int i = 0;
+  for (const Vec<6>& load : loads) {
+    ++i;
     out.segment<3>(layout.q(i)) = load.head<3>();
     out.segment<4>(layout.p(i)) = 2 * G_transposed_times(y_.segment<4>(layout.p(i)), Vector3d(load.tail<3>()));
   }
@@ -170,10 +171,12 @@ MatrixXd StateQuery::Q_y() {
       out.col(first + k) = to_coordinates(change);
     }
   }
-  for (int i = 1; i <= data_.n; ++i) {  // 2 G(p')' times the torque
-    const Vector3d torque = loads_[static_cast<std::size_t>(i - 1)].tail<3>();
+  int i = 0;
+  for (const Vec<6>& load : loads_) {  // 2 G(p')' times the torque
+    const Vector3d torque = load.tail<3>();
+    const Index p = layout.p(++i);
     for (int k = 0; k < 4; ++k)
-      out.block<4, 1>(layout.p(i), layout.p(i) + k) += 2 * G_transposed_times(Vector4d(Vector4d::Unit(k)), torque);
+      out.block<4, 1>(p, p + k) += 2 * G_transposed_times(Vector4d(Vector4d::Unit(k)), torque);
   }
   return out;
 }
@@ -211,8 +214,9 @@ Scene starting_at(const Scene& scene, const Mechanism& mechanism, const VectorXd
   Scene out = scene;
   out.conditions.clear();
   out.equilibrium = false;
-  for (int i = 1; i <= data.n; ++i) {
-    Body& body = out.bodies[static_cast<std::size_t>(i - 1)];
+  int i = 0;
+  for (Body& body : out.bodies) {
+    ++i;
     const Vector4d p = y.segment<4>(layout.p(i));
     const Vector3d s = mbsopt::A(p) * data.bodies[static_cast<std::size_t>(i)].com;  // from the origin
     const Vector3d omega = mbsopt::A(p) * (2 * G_times(p, Vector4d(y.segment<4>(layout.pdot(i)))));

@@ -21,6 +21,7 @@ constexpr int kOwnSteps = 20;         // steps for which they are used once the 
 ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
                                SpatialDynamics& dynamics)
     : data_(mechanism.data()),
+      layout_{data_.n},
       rk_(method),
       settings_(settings),
       tolerances_(data_, settings),
@@ -54,9 +55,9 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
   for (Points* points : {&past_, &present_}) {
     points->places.assign(static_cast<std::size_t>(rk_.stages), {0, Eigen::VectorXd::Zero(rows)});
   }
-  x_.setZero(rows, largest), r_.setZero(rows * largest, 1), change_.setZero(14 * data_.n, largest);
-  a_start_.setZero(7 * data_.n), lambda_start_.setZero(data_.m);
-  y_.setZero(14 * data_.n);
+  x_.setZero(rows, largest), r_.setZero(rows * largest, 1), change_.setZero(layout_.size(), largest);
+  a_start_.setZero(layout_.positions()), lambda_start_.setZero(data_.m);
+  y_.setZero(layout_.size());
 }
 
 long ImplicitStages::factorisations() const {
@@ -78,7 +79,7 @@ void ImplicitStages::begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eig
 void ImplicitStages::new_attempt() { present_.count = 0; }
 
 void ImplicitStages::accept(const Step& step) {
-  const Eigen::Index n = 7 * data_.n;
+  const Eigen::Index n = layout_.positions();
   std::swap(past_, present_);
   present_.count = 0;
   // The next Jacobian is that of the latest stage.
@@ -149,7 +150,7 @@ void ImplicitStages::predict(const Step& step, int stage, Eigen::Ref<Eigen::Vect
 
 // Y and K of the group's stages from the accelerations in x_.
 void ImplicitStages::set_stages(Step& step, const StageGroup& g) {
-  const Eigen::Index n = 7 * data_.n;
+  const Eigen::Index n = layout_.positions();
   for (int i = g.first; i <= g.last; ++i) {
     step.K.col(i).tail(n) = x_.col(i - g.first).head(n);
     step.lambda.col(i) = x_.col(i - g.first).tail(data_.m);
@@ -162,7 +163,7 @@ bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Mat
   for (int i = 0; i < g.size(); ++i) {
     const int stage = g.first + i;
     y_ = step.Y.col(stage);
-    equations_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, step.K.col(stage).tail(7 * data_.n),
+    equations_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, step.K.col(stage).tail(layout_.positions()),
                         step.lambda.col(stage));
     MotionJacobian::Values& own = own_values_[static_cast<std::size_t>(i)];
     jacobian_.evaluate(equations_, own);
@@ -174,7 +175,7 @@ bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Mat
 
 // Residuals of the group's stages at x_ into r_.
 bool ImplicitStages::evaluate_residuals(Step& step, const StageGroup& g) {
-  const Eigen::Index n = 7 * data_.n, rows = n + data_.m;
+  const Eigen::Index n = layout_.positions(), rows = n + data_.m;
   set_stages(step, g);
   for (int i = 0; i < g.size(); ++i) {
     const int stage = g.first + i;
@@ -189,7 +190,7 @@ bool ImplicitStages::evaluate_residuals(Step& step, const StageGroup& g) {
 // Adds the change in r_ to x_. Returns the change of the stages: root mean square in units of the tolerance (exact: of
 // the state's size).
 double ImplicitStages::add_change(const Step& step, const StageGroup& g, const Matrix& m, bool exact) {
-  const Eigen::Index n = 7 * data_.n, rows = n + data_.m;
+  const Eigen::Index n = layout_.positions(), rows = n + data_.m;
   const int s = g.size();
   double sum = 0;
   for (int i = 0; i < s; ++i) {
@@ -217,7 +218,7 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal go
   const bool exact = goal != Goal::tolerance;
   for (int i = 0; i < g.size(); ++i) {
     if (goal == Goal::polish) {
-      x_.col(i) << step.K.col(g.first + i).tail(7 * data_.n), step.lambda.col(g.first + i);
+      x_.col(i) << step.K.col(g.first + i).tail(layout_.positions()), step.lambda.col(g.first + i);
     } else {
       predict(step, g.first + i, x_.col(i));
     }
@@ -278,7 +279,7 @@ bool ImplicitStages::solve(Step& step, const StageGroup& g, Goal goal) {
   for (int i = g.first; i <= g.last; ++i) {
     Point& p = present_.places[present_.count++];
     p.t = step.t + rk_.c[i] * step.h;
-    p.x << step.K.col(i).tail(7 * data_.n), step.lambda.col(i);
+    p.x << step.K.col(i).tail(layout_.positions()), step.lambda.col(i);
   }
   return true;
 }

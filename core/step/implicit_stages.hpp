@@ -14,6 +14,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/body/state_layout.hpp"
 #include "core/scene/settings.hpp"
 #include "core/step/component_tolerances.hpp"
 #include "core/step/shifted_system.hpp"
@@ -84,6 +85,7 @@ class ImplicitStages {
   bool iterate(Step& step, const StageGroup& group, Matrix& m, Goal goal, bool own);
 
   const MechanismData& data_;
+  const StateLayout layout_;
   const Method& rk_;
   IntegratorSettings settings_;
   ComponentTolerances tolerances_;

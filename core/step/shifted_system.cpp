@@ -1,9 +1,11 @@
 #include "core/step/shifted_system.hpp"
 
+#include "core/body/state_layout.hpp"
+
 namespace mbsopt {
 
 ShiftedSystem::ShiftedSystem(const MechanismData& data, const MotionJacobian& jacobian)
-    : jacobian_(&jacobian), matrix_(data, jacobian, 1), half_(7 * data.n) {
+    : jacobian_(&jacobian), matrix_(data, jacobian, 1), half_(StateLayout{data.n}.positions()) {
   r_.setZero(matrix_.size(), kLanes);
   y_.setZero(2 * half_, kLanes);
 }
@@ -21,16 +23,16 @@ void ShiftedSystem::solve(Eigen::Ref<Eigen::MatrixXd> x, int refinements) {
   r.setZero();
   std::size_t k = 0;
   for (const auto& p : jacobian_->pairs()) {
-    auto out = r.middleRows<7>(7 * p.row);
-    out.noalias() -= values_->q[k] * x_q.middleRows<7>(7 * p.body);
-    out.noalias() -= values_->v[k] * x_v.middleRows<7>(7 * p.body);
+    auto out = r.middleRows<7>(columns_of(p.row));
+    out.noalias() -= values_->q[k] * x_q.middleRows<7>(columns_of(p.body));
+    out.noalias() -= values_->v[k] * x_v.middleRows<7>(columns_of(p.body));
     ++k;
   }
   k = 0;
   for (const auto& row : jacobian_->rows()) {
     auto out = r.row(half_ + row.row);
-    out.noalias() -= values_->row_q[k] * x_q.middleRows<7>(7 * row.body);
-    out.noalias() -= values_->row_v[k] * x_v.middleRows<7>(7 * row.body);
+    out.noalias() -= values_->row_q[k] * x_q.middleRows<7>(columns_of(row.body));
+    out.noalias() -= values_->row_v[k] * x_v.middleRows<7>(columns_of(row.body));
     ++k;
   }
   matrix_.solve(r, refinements);
@@ -49,16 +51,16 @@ void ShiftedSystem::solve_transposed(Eigen::Ref<Eigen::MatrixXd> x, int refineme
   y.setZero();
   std::size_t k = 0;
   for (const auto& p : jacobian_->pairs()) {
-    const auto beta = r.middleRows<7>(7 * p.row);
-    y.middleRows<7>(7 * p.body).noalias() -= values_->q[k].transpose() * beta;
-    y.middleRows<7>(half_ + 7 * p.body).noalias() -= values_->v[k].transpose() * beta;
+    const auto beta = r.middleRows<7>(columns_of(p.row));
+    y.middleRows<7>(columns_of(p.body)).noalias() -= values_->q[k].transpose() * beta;
+    y.middleRows<7>(half_ + columns_of(p.body)).noalias() -= values_->v[k].transpose() * beta;
     ++k;
   }
   k = 0;
   for (const auto& row : jacobian_->rows()) {
     const auto beta = r.row(half_ + row.row);
-    y.middleRows<7>(7 * row.body).noalias() -= values_->row_q[k].transpose() * beta;
-    y.middleRows<7>(half_ + 7 * row.body).noalias() -= values_->row_v[k].transpose() * beta;
+    y.middleRows<7>(columns_of(row.body)).noalias() -= values_->row_q[k].transpose() * beta;
+    y.middleRows<7>(half_ + columns_of(row.body)).noalias() -= values_->row_v[k].transpose() * beta;
     ++k;
   }
   x_q += y.topRows(half_);

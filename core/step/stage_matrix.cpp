@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -25,15 +27,18 @@ void add_block(int row, int column, int rows, int columns, Entries& entries) {
 
 // The places of all blocks, in the order in which factor_sparse() fills them.
 Entries entries_of(const MotionJacobian& jacobian, int stages) {
-  const int n = 7 * jacobian.bodies(), size = n + jacobian.constraints();
+  const int n = columns_of(jacobian.bodies()), size = n + jacobian.constraints();
   Entries entries;
   for (int i = 0; i < stages; ++i) {
     for (int j = 0; j < stages; ++j) {
-      for (const auto& p : jacobian.pairs()) add_block(i * size + 7 * p.row, j * size + 7 * p.body, 7, 7, entries);
-      for (const auto& r : jacobian.rows()) add_block(i * size + n + r.row, j * size + 7 * r.body, 1, 7, entries);
+      for (const auto& p : jacobian.pairs())
+        add_block(i * size + columns_of(p.row), j * size + columns_of(p.body), 7, 7, entries);
+      for (const auto& r : jacobian.rows())
+        add_block(i * size + n + r.row, j * size + columns_of(r.body), 1, 7, entries);
     }
-    for (int b = 0; b < jacobian.bodies(); ++b) add_block(i * size + 7 * b, i * size + 7 * b, 7, 7, entries);
-    for (const auto& r : jacobian.rows()) add_block(i * size + 7 * r.body, i * size + n + r.row, 6, 1, entries);
+    for (int b = 0; b < jacobian.bodies(); ++b)
+      add_block(i * size + columns_of(b), i * size + columns_of(b), 7, 7, entries);
+    for (const auto& r : jacobian.rows()) add_block(i * size + columns_of(r.body), i * size + n + r.row, 6, 1, entries);
     for (int r = 0; r < jacobian.constraints(); ++r) add_block(i * size + n + r, i * size + n + r, 1, 1, entries);
   }
   return entries;
@@ -44,8 +49,8 @@ Entries entries_of(const MotionJacobian& jacobian, int stages) {
 StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobian, int stages)
     : jacobian_(&jacobian),
       stages_(stages),
-      accelerations_(7 * data.n),
-      per_stage_(7 * data.n + data.m),
+      accelerations_(StateLayout{data.n}.positions()),
+      per_stage_(StageEquations::count(data)),
       mobility_(data.row_alpha.cwiseInverse()),
       epsilon_(kRelativeEpsilon * mobility_) {
   set_scales(data);
@@ -230,7 +235,7 @@ bool StageMatrix::is_right() {
   double largest = 0;
   for (int i = 0; i < stages_; ++i) {
     for (int b = 0; b < jacobian_->bodies(); ++b) {
-      answer_.segment<7>(i * per_stage_ + 7 * b).setConstant(b % 2 == 0 ? -1 : 1);
+      answer_.segment<7>(i * per_stage_ + columns_of(b)).setConstant(b % 2 == 0 ? -1 : 1);
     }
   }
   subtract_times<false>(answer_, probe_);
@@ -244,7 +249,7 @@ bool StageMatrix::is_right() {
   double wrong = 0;
   for (int i = 0; i < stages_; ++i) {
     for (int b = 0; b < jacobian_->bodies(); ++b) {
-      wrong = std::max(wrong, probe_.segment<6>(i * per_stage_ + 7 * b).cwiseAbs().maxCoeff());
+      wrong = std::max(wrong, probe_.segment<6>(i * per_stage_ + columns_of(b)).cwiseAbs().maxCoeff());
     }
   }
   if (!answer_.allFinite()) return false;
@@ -324,7 +329,8 @@ template <bool Columns>
 void StageMatrix::scale(Eigen::Ref<Eigen::MatrixXd> b) const {
   for (int i = 0; i < stages_; ++i) {
     for (int body = 0; body < jacobian_->bodies(); ++body) {
-      b.middleRows<7>(i * per_stage_ + 7 * body).array().colwise() *= (Columns ? column_scale_ : row_scale_).array();
+      b.middleRows<7>(i * per_stage_ + columns_of(body)).array().colwise() *=
+          (Columns ? column_scale_ : row_scale_).array();
     }
     b.middleRows(i * per_stage_ + accelerations_, W_.size()).array().colwise() *= multiplier_scale_.array();
   }
@@ -343,7 +349,7 @@ void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
   for (int i = 0; i < stages_; ++i) {
     for (int body = 0; body < jacobian_->bodies(); ++body) {
       by_body_.segment<7>(body * stride + 7 * i) =
-          (Transposed ? column_scale_ : row_scale_).cwiseProduct(b.segment<7>(i * per_stage_ + 7 * body));
+          (Transposed ? column_scale_ : row_scale_).cwiseProduct(b.segment<7>(i * per_stage_ + columns_of(body)));
     }
   }
   if (Transposed) {
@@ -353,7 +359,7 @@ void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
   }
   for (int i = 0; i < stages_; ++i) {
     for (int body = 0; body < jacobian_->bodies(); ++body) {
-      b.segment<7>(i * per_stage_ + 7 * body) =
+      b.segment<7>(i * per_stage_ + columns_of(body)) =
           (Transposed ? row_scale_ : column_scale_).cwiseProduct(by_body_.segment<7>(body * stride + 7 * i));
     }
     auto lambda = b.segment(i * per_stage_ + accelerations_, W_.size());
@@ -380,20 +386,21 @@ void StageMatrix::subtract_times(const Eigen::Ref<const Eigen::VectorXd>& x, Eig
     for (std::size_t k = 0; k < jacobian_->pairs().size(); ++k) {
       const auto& p = jacobian_->pairs()[k];
       if (Transposed) {
-        const Vec<7> beta = x.segment<7>(stage + 7 * p.row);
-        v_.segment<7>(combined + 7 * p.body).noalias() += of.v[k].transpose() * beta;
-        q_.segment<7>(combined + 7 * p.body).noalias() += of.q[k].transpose() * beta;
+        const Vec<7> beta = x.segment<7>(stage + columns_of(p.row));
+        v_.segment<7>(combined + columns_of(p.body)).noalias() += of.v[k].transpose() * beta;
+        q_.segment<7>(combined + columns_of(p.body)).noalias() += of.q[k].transpose() * beta;
       } else {
-        auto to = y.segment<7>(stage + 7 * p.row);
-        to.noalias() -= of.v[k] * v_.segment<7>(combined + 7 * p.body);
-        to.noalias() -= of.q[k] * q_.segment<7>(combined + 7 * p.body);
+        auto to = y.segment<7>(stage + columns_of(p.row));
+        to.noalias() -= of.v[k] * v_.segment<7>(combined + columns_of(p.body));
+        to.noalias() -= of.q[k] * q_.segment<7>(combined + columns_of(p.body));
       }
     }
     for (int b = 0; b < jacobian_->bodies(); ++b) {
       if (Transposed) {
-        y.segment<7>(stage + 7 * b).noalias() -= of.mass[at(b)].transpose() * x.segment<7>(stage + 7 * b);
+        y.segment<7>(stage + columns_of(b)).noalias() -=
+            of.mass[at(b)].transpose() * x.segment<7>(stage + columns_of(b));
       } else {
-        y.segment<7>(stage + 7 * b).noalias() -= of.mass[at(b)] * x.segment<7>(stage + 7 * b);
+        y.segment<7>(stage + columns_of(b)).noalias() -= of.mass[at(b)] * x.segment<7>(stage + columns_of(b));
       }
     }
     y.segment(stage + accelerations_, W_.size()) += of.compliance * x.segment(stage + accelerations_, W_.size());
@@ -436,9 +443,9 @@ void StageMatrix::add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
     const Eigen::Index stage = i * per_stage_, combined = i * accelerations_;
     for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
       const auto& r = jacobian_->rows()[k];
-      y(stage + accelerations_ + r.row) += sign * (of.row_v[k].dot(v_.segment<7>(combined + 7 * r.body)) +
-                                                   of.row_q[k].dot(q_.segment<7>(combined + 7 * r.body)) +
-                                                   of.J_T[k].dot(x.segment<7>(stage + 7 * r.body)));
+      y(stage + accelerations_ + r.row) += sign * (of.row_v[k].dot(v_.segment<7>(combined + columns_of(r.body))) +
+                                                   of.row_q[k].dot(q_.segment<7>(combined + columns_of(r.body))) +
+                                                   of.J_T[k].dot(x.segment<7>(stage + columns_of(r.body))));
     }
   }
 }
@@ -452,9 +459,9 @@ void StageMatrix::add_G_transposed(double sign, const Eigen::Ref<const Eigen::Ve
     for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
       const auto& r = jacobian_->rows()[k];
       const double lambda = x(stage + accelerations_ + r.row);
-      v_.segment<7>(combined + 7 * r.body) += lambda * of.row_v[k].transpose();
-      q_.segment<7>(combined + 7 * r.body) += lambda * of.row_q[k].transpose();
-      y.segment<7>(stage + 7 * r.body) += (sign * lambda) * of.J_T[k].transpose();
+      v_.segment<7>(combined + columns_of(r.body)) += lambda * of.row_v[k].transpose();
+      q_.segment<7>(combined + columns_of(r.body)) += lambda * of.row_q[k].transpose();
+      y.segment<7>(stage + columns_of(r.body)) += (sign * lambda) * of.J_T[k].transpose();
     }
   }
   spread(sign, y);
@@ -466,7 +473,7 @@ void StageMatrix::add_J(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
     const Eigen::Index stage = i * per_stage_;
     for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
       const auto& r = jacobian_->rows()[k];
-      y(stage + accelerations_ + r.row) += sign * of.J[k].dot(x.segment<6>(stage + 7 * r.body));
+      y(stage + accelerations_ + r.row) += sign * of.J[k].dot(x.segment<6>(stage + columns_of(r.body)));
     }
   }
 }
@@ -478,7 +485,7 @@ void StageMatrix::add_J_transposed(double sign, const Eigen::Ref<const Eigen::Ve
     const Eigen::Index stage = i * per_stage_;
     for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
       const auto& r = jacobian_->rows()[k];
-      y.segment<6>(stage + 7 * r.body) += (sign * x(stage + accelerations_ + r.row)) * of.J[k].transpose();
+      y.segment<6>(stage + columns_of(r.body)) += (sign * x(stage + accelerations_ + r.row)) * of.J[k].transpose();
     }
   }
 }

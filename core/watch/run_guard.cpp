@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -22,9 +23,10 @@ constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation m
 
 // The natural size of the energy of a motion. It is a scale for runs that begin at rest at zero potential.
 double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
+  const StateLayout layout{d.n};
   double sum = 0;
-  for (int i = 1; i <= d.n; ++i) {
-    sum += d.bodies[static_cast<std::size_t>(i)].mass * d.gravity.norm() * y.segment<3>(7 * (i - 1)).norm();
+  for (std::size_t k = 1; k < d.bodies.size(); ++k) {
+    sum += d.bodies[k].mass * d.gravity.norm() * y.segment<3>(layout.q(k)).norm();
   }
   d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
@@ -34,7 +36,7 @@ double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
 }
 
 Eigen::Vector2d speeds(const Eigen::VectorXd& y, int i, int n) {
-  const auto v = y.segment<7>(7 * (n + i - 1));
+  const auto v = y.segment<7>(StateLayout{n}.v(i));
   return {v.head<3>().stableNorm(), 2 * v.tail<4>().stableNorm()};  // |omega| = 2 |pdot|
 }
 

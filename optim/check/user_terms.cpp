@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/state_layout.hpp"
 #include "core/expression/curve.hpp"
 #include "core/expression/expression.hpp"
 #include "core/force/bound_force.hpp"
@@ -48,20 +49,22 @@ Vector4d turned(const Vector4d& p, int axis) {
 std::vector<Direction> directions(const VectorXd& q, const VectorXd& v, const std::vector<std::string>& bodies) {
   constexpr const char* kAxes[] = {"x", "y", "z"};
   std::vector<Direction> all;
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    const Index at = 7 * static_cast<Index>(b);
+  const StateLayout layout{static_cast<int>(bodies.size())};
+  int number = 0;
+  for (const std::string& body : bodies) {
+    const Index at = layout.q(++number);
     const Vector4d p = q.segment<4>(at + 3), pdot = v.segment<4>(at + 3);
     for (int axis = 0; axis < 3; ++axis) {
       Direction d{VectorXd::Zero(q.size()), VectorXd::Zero(q.size()), false, false, ""};
-      d.q(at + axis) = 1, d.name = fmt::format("{} of '{}'", kAxes[axis], bodies[b]);
+      d.q(at + axis) = 1, d.name = fmt::format("{} of '{}'", kAxes[axis], body);
       all.push_back(d);
       d.q(at + axis) = 0, d.v(at + axis) = 1, d.of_rates = true, d.name = fmt::format("the rate of {}", d.name);
       all.push_back(d);
       d.v(at + axis) = 0, d.v.segment<4>(at + 3) = turned(p, axis), d.turns = true;
-      d.name = fmt::format("the angular velocity of '{}' about its {}", bodies[b], kAxes[axis]);
+      d.name = fmt::format("the angular velocity of '{}' about its {}", body, kAxes[axis]);
       all.push_back(d);
       d.q.segment<4>(at + 3) = turned(p, axis), d.v.segment<4>(at + 3) = -d.q.segment<4>(at + 3).dot(pdot) * p;
-      d.of_rates = false, d.name = fmt::format("a turn of '{}' about its {}", bodies[b], kAxes[axis]);
+      d.of_rates = false, d.name = fmt::format("a turn of '{}' about its {}", body, kAxes[axis]);
       all.push_back(d);
     }
   }
@@ -144,11 +147,13 @@ class UserTerms {
     const UserForceData& data = mechanism_.data().user_forces[index];
     const BoundForce& force = *data.force;
     const std::vector<std::string> bodies = force.bodies();
-    const Index size = 7 * static_cast<Index>(bodies.size()), n = y.size() / 2;
+    const StateLayout own{static_cast<int>(bodies.size())}, whole = StateLayout::of(y);
+    const Index size = own.positions();
     VectorXd q(size), v(size);
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-      const Index at = 7 * static_cast<Index>(b), from = 7 * (data.bodies[b] - 1);
-      q.segment<7>(at) = y.segment<7>(from), v.segment<7>(at) = y.segment<7>(n + from);
+    int number = 0;
+    for (const int body : data.bodies) {
+      const Index at = own.q(++number);
+      q.segment<7>(at) = y.segment<7>(whole.q(body)), v.segment<7>(at) = y.segment<7>(whole.v(body));
     }
     const std::string name = fmt::format("{} (on '{}')", force.name(), fmt::join(bodies, "', '"));
     const auto Q = [&](const BoundForce& of, const VectorXd& q_at, const VectorXd& v_at, const VectorXd& rho) {

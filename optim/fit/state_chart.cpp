@@ -1,5 +1,6 @@
 #include "optim/fit/state_chart.hpp"
 
+#include "core/body/state_layout.hpp"
 #include "core/linear/dense.hpp"
 
 namespace mbsopt {
@@ -12,10 +13,10 @@ StateChart::StateChart(const VectorXd& y, const MatrixXd& y_u)
     : y0_(y), W_(OrthogonalDecomposition(y_u).solve(MatrixXd::Identity(y.size(), y.size()))) {}
 
 void StateChart::read(const VectorXd& y, const MatrixXd& y_rho, VectorXd& s, MatrixXd& s_rho) const {
-  const Index bodies = y.size() / 14;
+  const StateLayout layout = StateLayout::of(y);
   VectorXd sign = VectorXd::Ones(y.size());
-  for (Index b = 0; b < bodies; ++b) {
-    const Index p = 7 * b + 3, pdot = 7 * (bodies + b) + 3;
+  for (int i = 1; i <= layout.n; ++i) {
+    const Index p = layout.p(i), pdot = layout.pdot(i);
     if (y.segment<4>(p).dot(y0_.segment<4>(p)) < 0)
       sign.segment<4>(p).setConstant(-1), sign.segment<4>(pdot).setConstant(-1);
   }

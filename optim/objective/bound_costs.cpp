@@ -1,11 +1,13 @@
 #include "optim/objective/bound_costs.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <span>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "core/body/state_layout.hpp"
 #include "core/expression/program.hpp"
 #include "core/scene/scene_path.hpp"
 #include "optim/objective/expression_cost.hpp"
@@ -17,7 +19,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// The inputs of both costs of a term: rows of y, and the term's parameters, computed from those of the scene.
+// The inputs of both costs of a term: the state of its bodies, and the term's parameters, computed from those of the
+// scene.
 class TermInputs {
  public:
   TermInputs(const Scene& scene, const UserCostSpec& spec, const std::string& place) {
@@ -32,26 +35,27 @@ class TermInputs {
     for (const std::string& name : spec.bodies) {
       const auto body = std::ranges::find(scene.bodies, name, &Body::name);
       if (body == scene.bodies.end()) throw std::invalid_argument(place + ".bodies: there is no body '" + name + "'");
-      rows_.push_back(7 * (body - scene.bodies.begin()));
+      bodies_.push_back(static_cast<int>(body - scene.bodies.begin()) + 1);
     }
     if (!spec.bodies.empty()) return;
-    for (std::size_t i = 0; i < scene.bodies.size(); ++i) rows_.push_back(7 * static_cast<Index>(i));
+    bodies_.resize(scene.bodies.size() + 1);
+    std::iota(bodies_.begin(), bodies_.end(), 0);
   }
 
   VectorXd state(VecIn y) const {
-    const Index own = 7 * static_cast<Index>(rows_.size()), all = y.size() / 2;
-    VectorXd part(2 * own);
-    for (std::size_t k = 0; k < rows_.size(); ++k) {
-      part.segment<7>(7 * static_cast<Index>(k)) = y.segment<7>(rows_[k]);
-      part.segment<7>(own + 7 * static_cast<Index>(k)) = y.segment<7>(all + rows_[k]);
+    const StateLayout own{static_cast<int>(bodies_.size()) - 1}, all = StateLayout::of(y);
+    VectorXd part(own.size());
+    for (std::size_t k = 1; k < bodies_.size(); ++k) {
+      part.segment<7>(own.q(k)) = y.segment<7>(all.q(bodies_[k]));
+      part.segment<7>(own.v(k)) = y.segment<7>(all.v(bodies_[k]));
     }
     return part;
   }
   void add_state(const VectorXd& part, VecOut out) const {
-    const Index own = part.size() / 2, all = out.size() / 2;
-    for (std::size_t k = 0; k < rows_.size(); ++k) {
-      out.segment<7>(rows_[k]) += part.segment<7>(7 * static_cast<Index>(k));
-      out.segment<7>(all + rows_[k]) += part.segment<7>(own + 7 * static_cast<Index>(k));
+    const StateLayout own = StateLayout::of(part), all = StateLayout::of(out);
+    for (std::size_t k = 1; k < bodies_.size(); ++k) {
+      out.segment<7>(all.q(bodies_[k])) += part.segment<7>(own.q(k));
+      out.segment<7>(all.v(bodies_[k])) += part.segment<7>(own.v(k));
     }
   }
 
@@ -76,7 +80,7 @@ class TermInputs {
   static std::span<const double> view(const VecIn& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
 
   std::vector<Program> parameters_;
-  std::vector<Index> rows_;  // of the bodies' q in that of the scene
+  std::vector<int> bodies_{0};  // of the term, by their numbers in the scene; the ground first
 };
 
 class BoundRunning final : public RunningCost {

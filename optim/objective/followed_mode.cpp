@@ -104,7 +104,7 @@ namespace {
 // f_y, column by column.
 MatrixXd state_matrix(SpatialDynamics& dynamics) {
   const ParameterBlock none = block_without_parameters(dynamics.data());
-  const Index states = 14 * dynamics.data().n;
+  const Index states = StateLayout{dynamics.data().n}.size();
   MatrixXd F(states, states);
   LaneRows y_dir(states, kLanes), ydot_dir(states, kLanes);
   for (Index first = 0; first < states; first += kLanes) {

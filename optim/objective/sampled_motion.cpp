@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/state_point.hpp"
 
@@ -49,13 +50,15 @@ MotionDistance::MotionDistance(const Mechanism& mechanism) {
 
 double MotionDistance::between(const Eigen::Ref<const Eigen::VectorXd>& y1,
                                const Eigen::Ref<const Eigen::VectorXd>& y2) const {
+  const StateLayout layout = StateLayout::of(y1);
   double sum = 0;
-  for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    const Index at = 7 * static_cast<Index>(b);
-    const Vector4d p1 = y1.segment<4>(at + 3), p2 = y2.segment<4>(at + 3);
+  int body = 0;
+  for (const Body& b : bodies_) {
+    ++body;
+    const Vector4d p1 = y1.segment<4>(layout.p(body)), p2 = y2.segment<4>(layout.p(body));
     const Matrix3d D = A(p1) - A(p2);
-    sum += bodies_[b].mass * (y1.segment<3>(at) - y2.segment<3>(at)).squaredNorm();
-    sum += std::max(0.0, (D * bodies_[b].P * D.transpose()).trace());
+    sum += b.mass * (y1.segment<3>(layout.q(body)) - y2.segment<3>(layout.q(body))).squaredNorm();
+    sum += std::max(0.0, (D * b.P * D.transpose()).trace());
   }
   return std::sqrt(sum / total_);
 }
