@@ -52,10 +52,15 @@ endfunction()
 # mbsopt_precompile(<target> <header>...): Eigen, the standard library and the headers given are parsed once per target,
 # which halves the time of a build. Each source still includes what it uses. Where nothing is precompiled, Eigen's
 # kernels are compiled in each source.
+# mbsopt_precompile(<target> REUSE_FROM <other>): takes those of a target with the same options.
 function(mbsopt_precompile target)
-  target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/core/linear/eigen_kernels.hpp
-                            <algorithm> <array> <cmath> <functional> <limits> <map>
-                            <memory> <optional> <span> <stdexcept> <string> <string_view> <utility> <vector> ${ARGN})
+  if(ARGV1 STREQUAL REUSE_FROM)
+    target_precompile_headers(${target} REUSE_FROM ${ARGV2})
+  else()
+    target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/core/linear/eigen_kernels.hpp
+                              <algorithm> <array> <cmath> <functional> <limits> <map>
+                              <memory> <optional> <span> <stdexcept> <string> <string_view> <utility> <vector> ${ARGN})
+  endif()
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     target_compile_options(${target} PRIVATE -fpch-preprocess)  # ccache's manual, "Precompiled headers"
   elseif(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
