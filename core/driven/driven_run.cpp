@@ -83,49 +83,34 @@ void DrivenRun::go(const Take& take) {
   go_through_panels(take);
   result_.y_end = path_.state().y;
   if (!result_.ok()) return;
-  if (!take_terminal_costs(take)) {
-    return stop(SimulationStatus::not_finite, fmt::format("the derivatives met a matrix that cannot be factored at "
-                                                          "t = {:.6g} s: a singular position?",
-                                                          path_.state().t));
-  }
+  if (!take_terminal_costs(take)) return stop_at_singular_matrix();
   if (!result_.psi.allFinite()) stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi));
 }
 
-void DrivenRun::go_through_panels(const Take& take) {
-  const double end = settings_.end_time;
-  EventTimes events(settings_.events, settings_.start_time, end);
+// What the panels of a run share.
+struct DrivenRun::Course {
+  EventTimes events;
   std::optional<JumpWatch> jumps;
-  if (differentiated_ && !options_.frozen) {
-    jumps.emplace(mechanism_, settings_, costs_, motion_ ? &*motion_ : nullptr);
-    jumps->begin(point());
-  }
-  const StepSequence* const frozen = options_.frozen;
-  double h = end - settings_.start_time;
+  double h;                     // of the next panel
   double ended_at = -INFINITY;  // time at which a panel was stuck last
   std::size_t panel = 0;
+};
+
+void DrivenRun::go_through_panels(const Take& take) {
+  const double end = settings_.end_time;
+  Course course{EventTimes(settings_.events, settings_.start_time, end), {}, end - settings_.start_time};
+  const StepSequence* const frozen = options_.frozen;
+  if (differentiated_ && !frozen) {
+    course.jumps.emplace(mechanism_, settings_, costs_, motion_ ? &*motion_ : nullptr);
+    course.jumps->begin(point());
+  }
   while (path_.state().t < end) {
-    const double t = path_.state().t;
-    double t1 = end;
-    if (frozen) {
-      if (panel >= frozen->times.size()) break;
-      if (panel + 1 < frozen->times.size() || !frozen->to_the_end) t1 = frozen->times[panel] + frozen->sizes[panel];
-    } else {
-      const double stop_at = events.stop_after(t);
-      h = std::min(h, largest_panel());
-      t1 = h >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + h;
-      // Without integrals a panel ends at the next event, so that no part of the path is solved twice.
-      if (const double event = schedule_.next_time(); running_.empty() && event > t) t1 = std::min(t1, event);
-    }
+    if (frozen && course.panel >= frozen->times.size()) break;
+    const double t = path_.state().t, t1 = frozen ? frozen_end(course) : next_end(course, t);
     from_ = path_.state();
     const Panel outcome = try_panel(t1);
-    const double reached = path_.state().t;
-    if (outcome == Panel::refused || (outcome == Panel::stuck && !frozen && reached - t > shortest_)) {
-      ++result_.statistics.rejected, ++result_.statistics.rejections.error_test;
-      path_.start(from_);
-      // Other steps may pass where the path ended. If it ends there again, so does the panel.
-      const bool ends = outcome == Panel::stuck && std::abs(reached - ended_at) <= kSameEnd * (end - t);
-      if (outcome == Panel::stuck) ended_at = reached;
-      h = ends ? reached - t : (t1 - t) / 2;
+    if (outcome == Panel::refused || (outcome == Panel::stuck && !frozen && path_.state().t - t > shortest_)) {
+      try_shorter(course, outcome, t, t1);
       continue;
     }
     if (outcome == Panel::stuck) return stop(SimulationStatus::step_too_small, why_it_ends());
@@ -137,33 +122,67 @@ void DrivenRun::go_through_panels(const Take& take) {
                       settings_.integrator.max_steps, t));
     }
     if (!take_panel(t1, take)) {
-      if (!result_.ok()) return;
-      return stop(SimulationStatus::not_finite, fmt::format("the derivatives met a matrix that cannot be factored at "
-                                                            "t = {:.6g} s: a singular position?",
-                                                            path_.state().t));
+      if (result_.ok()) stop_at_singular_matrix();
+      return;
     }
     end_panel(t, t1);
-    if (!frozen) {
-      const std::string jump = law_jumps_.between(t, events.reached(t1) ? events.resume_time() : t1);
-      if (!jump.empty()) return stop(SimulationStatus::not_credible, jump);
+    const double resume = course.events.reached(t1) ? course.events.resume_time() : t1;
+    if (const std::string objection = objection_to(t, t1, resume); !objection.empty()) {
+      return stop(SimulationStatus::not_credible, objection);
     }
-    if (jumps) jumps->look_at(point());
-    if (differentiated_) {
-      const std::string objection = through_zero_length(mechanism_.data(), t, from_.y, t1, path_.state().y);
-      if (!objection.empty()) return stop(SimulationStatus::not_credible, objection);
-    }
+    if (course.jumps) course.jumps->look_at(point());
     if (options_.after_step) options_.after_step(point());
     if (options_.progress && !options_.progress(t1)) {
       return stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", t1));
     }
-    ++panel;
-    h *= 2;
-    const double resume = frozen ? (panel < frozen->times.size() ? frozen->times[panel] : t1)
-                                 : (events.reached(t1) ? events.resume_time() : t1);
-    if (!go_to(resume)) return stop(SimulationStatus::step_too_small, why_it_ends());
+    ++course.panel;
+    course.h *= 2;
+    const bool given = frozen && course.panel < frozen->times.size();
+    if (!go_to(given ? frozen->times[course.panel] : frozen ? t1 : resume)) {
+      return stop(SimulationStatus::step_too_small, why_it_ends());
+    }
   }
-  if (jumps) jumps->add_to(result_.statistics);
+  if (course.jumps) course.jumps->add_to(result_.statistics);
   add_quadrature_errors();
+}
+
+double DrivenRun::frozen_end(const Course& course) const {
+  const StepSequence& frozen = *options_.frozen;
+  const bool last = course.panel + 1 == frozen.times.size() && frozen.to_the_end;
+  return last ? settings_.end_time : frozen.times[course.panel] + frozen.sizes[course.panel];
+}
+
+double DrivenRun::next_end(Course& course, double t) const {
+  const double stop_at = course.events.stop_after(t);
+  course.h = std::min(course.h, largest_panel());
+  const double t1 = course.h >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + course.h;
+  // Without integrals a panel ends at the next event, so that no part of the path is solved twice.
+  const double event = schedule_.next_time();
+  return running_.empty() && event > t ? std::min(t1, event) : t1;
+}
+
+// Other steps may pass where the path ended. If it ends there again, so does the panel.
+void DrivenRun::try_shorter(Course& course, Panel outcome, double t, double t1) {
+  const double reached = path_.state().t;
+  ++result_.statistics.rejected, ++result_.statistics.rejections.error_test;
+  path_.start(from_);
+  const bool ends =
+      outcome == Panel::stuck && std::abs(reached - course.ended_at) <= kSameEnd * (settings_.end_time - t);
+  if (outcome == Panel::stuck) course.ended_at = reached;
+  course.h = ends ? reached - t : (t1 - t) / 2;
+}
+
+// Why the motion from t to t1 is not to be believed; the run goes on at `resume`.
+std::string DrivenRun::objection_to(double t, double t1, double resume) {
+  std::string jump = options_.frozen ? std::string() : law_jumps_.between(t, resume);
+  if (!jump.empty() || !differentiated_) return jump;
+  return through_zero_length(mechanism_.data(), t, from_.y, t1, path_.state().y);
+}
+
+void DrivenRun::stop_at_singular_matrix() {
+  stop(SimulationStatus::not_finite,
+       fmt::format("the derivatives met a matrix that cannot be factored at t = {:.6g} s: a singular position?",
+                   path_.state().t));
 }
 
 // The shortest panels were accepted without a test: they may hold an integrable singularity.

@@ -53,7 +53,12 @@ class DrivenRun {
   struct PanelErrors {  // of an integral: the sum, the largest of a panel, and when that begins
     double of_run = 0, worst = 0, worst_t = 0;
   };
+  struct Course;
   void go_through_panels(const Take& take);
+  double frozen_end(const Course& course) const;
+  double next_end(Course& course, double t) const;
+  void try_shorter(Course& course, Panel outcome, double t, double t1);
+  std::string objection_to(double t, double t1, double resume);
   Panel try_panel(double t1);
   double largest_panel() const;
   bool take_panel(double t1, const Take& take);
@@ -62,6 +67,7 @@ class DrivenRun {
   bool take_terminal_costs(const Take& take);
   void end_panel(double t0, double t1);
   void stop(SimulationStatus status, const std::string& message);
+  void stop_at_singular_matrix();
   bool go_to(double t);
   std::string why_it_ends();  // the reason why the path cannot continue
   StatePoint point() { return point_of(path_.state()); }
