@@ -156,77 +156,108 @@ class Search {
 
   void end(SolverStatus status, std::string message) { result_.status = status, result_.message = std::move(message); }
 
+  // A point at the end of a step, and what its cost gained; promised by the model.
+  struct Trial {
+    VectorXd x;
+    LeastSquaresPoint point;
+    double cost, promised, gained;
+  };
+
   // Ends with a status and a message.
   void iterate() {
-    double lambda = kFirstDamping;
-    int invalid = 0;
     LinearModel model(problem_, point_);
     if (!told(free_gradient(model), 0)) return;
     first_size_ = model.size;
     if (options_.large_residuals) equalise(model.units);
-    VectorXd d = step(model, lambda);
-    double missed = 0, missed_by = 0;  // length of the step refused last at this point, and what its model missed
+    VectorXd d = step(model, lambda_);
     while (true) {
-      if (no_gradient(model)) return converged(model, lambda);
-      if (is_short(model, d)) return converged(model, lambda);
-      if (result_.iterations == options_.max_iterations)
-        return end(SolverStatus::iteration_limit,
-                   fmt::format("stopped at the limit of {}{}", counted(options_.max_iterations, "iteration"),
-                               result_.failures()));
-      if (options_.max_evaluations && result_.evaluations >= *options_.max_evaluations)
-        return end(SolverStatus::iteration_limit,
-                   fmt::format("stopped at the limit of {}{}", counted(*options_.max_evaluations, "evaluation"),
-                               result_.failures()));
+      if (no_gradient(model) || is_short(model, d)) return converged(model, lambda_);
+      if (at_limit()) return;
       ++result_.iterations;
-      const VectorXd x = moved(d);
-      const double promised = promised_by(model, d);
-      LeastSquaresPoint trial = evaluated(x);
-      const double cost = trial.ok ? problem_.cost(trial.z) : kInfinity;
-      const double gained = cost_ - cost;
-      if (options_.large_residuals && std::isfinite(cost)) {
-        const double without = std::abs(model.promised(d) - gained),
-                     with_S = std::abs(model.promised(d) - raised_by(d) - gained);
-        const double with_b = bend_.size() > 0 ? std::abs(promised - gained) : kInfinity;
-        learnt_.takes_part = with_S < std::min(without, with_b);
-      }
-      const bool settled = std::abs(gained) <= options_.tolerance * model.size;
-      if (std::isfinite(cost) && (gained > kAccepted * std::max(promised, 0.0) || (settled && gained >= 0))) {
-        invalid = 0, missed = 0;
-        if (options_.large_residuals) learn(x - x_, trial);
-        x_ = x, cost_ = cost, point_ = std::move(trial);
-        const double ratio = gained / promised;
-        lambda = std::max(lambda * std::max(1. / 3, 1 - std::pow(2 * ratio - 1, 3)), kLeastDamping);
-        const VectorXd D = model.D;
-        model = LinearModel(problem_, point_);
-        model.D = model.units = model.D.cwiseMax(kShrinking * D);
-        if (options_.large_residuals) equalise(model.units);
-        if (!told(free_gradient(model), d.norm())) return;
-        if (settled) return converged(model, lambda);
-        d = step(model, lambda);
-        continue;
-      }
+      Trial trial = tried(model, d);
+      if (options_.large_residuals && std::isfinite(trial.cost)) choose_curvature(model, d, trial);
+      const bool settled = std::abs(trial.gained) <= options_.tolerance * model.size;
+      const bool accepted = std::isfinite(trial.cost) && (trial.gained > kAccepted * std::max(trial.promised, 0.0) ||
+                                                          (settled && trial.gained >= 0));
+      if (accepted) accept(std::move(trial), model);
       if (!told(free_gradient(model), d.norm())) return;
-      if (settled) return converged(model, lambda);
-      if (!trial.ok && ++invalid == kInvalidSteps)
-        return end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
-      // The error of the model's cost falls with the square of the step where the cost is smooth, and with its length
-      // at a kink.
-      const double length = model.units.cwiseProduct(d).norm(), miss = std::abs(promised - gained);
-      if (missed > 0 && miss < kSimulationNoise * model.size && miss > std::sqrt(length / missed) * missed_by)
-        return end(SolverStatus::converged,
-                   fmt::format("converged: errors of the simulation change the cost by {:.1g}, more than the {:.1g} "
-                               "that the derivatives promise",
-                               miss, promised));
-      missed = std::isfinite(miss) ? length : 0, missed_by = miss;
-      // Uses the parabola through both costs with the slope at the start.
-      const double slope = model.gradient.dot(d);
-      const double part = std::isfinite(cost) ? std::clamp(-slope / (2 * (cost - cost_ - slope)), 0.1, 0.5) : 0.25;
-      const double longest = part * model.units.cwiseProduct(d).norm();
-      do {
-        lambda *= 2;
-        d = step(model, lambda);
-      } while (model.units.cwiseProduct(d).norm() > longest);
+      if (settled) return converged(model, lambda_);
+      if (!accepted && is_last(trial, model, d)) return;
+      d = accepted ? step(model, lambda_) : shorter_step(model, d, trial);
     }
+  }
+
+  bool at_limit() {
+    const auto limit = [&](long most, const char* what) {
+      end(SolverStatus::iteration_limit,
+          fmt::format("stopped at the limit of {}{}", counted(most, what), result_.failures()));
+      return true;
+    };
+    if (result_.iterations == options_.max_iterations) return limit(options_.max_iterations, "iteration");
+    if (options_.max_evaluations && result_.evaluations >= *options_.max_evaluations)
+      return limit(*options_.max_evaluations, "evaluation");
+    return false;
+  }
+
+  Trial tried(const LinearModel& model, const VectorXd& d) {
+    Trial trial{moved(d), {}, kInfinity, promised_by(model, d), 0};
+    trial.point = evaluated(trial.x);
+    if (trial.point.ok) trial.cost = problem_.cost(trial.point.z);
+    trial.gained = cost_ - trial.cost;
+    return trial;
+  }
+
+  // The learnt curvature takes part in the next steps if it foretold this cost best.
+  void choose_curvature(const LinearModel& model, const VectorXd& d, const Trial& trial) {
+    const double without = std::abs(model.promised(d) - trial.gained),
+                 with_S = std::abs(model.promised(d) - raised_by(d) - trial.gained),
+                 with_b = bend_.size() > 0 ? std::abs(trial.promised - trial.gained) : kInfinity;
+    learnt_.takes_part = with_S < std::min(without, with_b);
+  }
+
+  void accept(Trial&& trial, LinearModel& model) {
+    invalid_ = 0, missed_ = 0;
+    if (options_.large_residuals) learn(trial.x - x_, trial.point);
+    x_ = trial.x, cost_ = trial.cost, point_ = std::move(trial.point);
+    const double ratio = trial.gained / trial.promised;
+    lambda_ = std::max(lambda_ * std::max(1. / 3, 1 - std::pow(2 * ratio - 1, 3)), kLeastDamping);
+    const VectorXd D = model.D;
+    model = LinearModel(problem_, point_);
+    model.D = model.units = model.D.cwiseMax(kShrinking * D);
+    if (options_.large_residuals) equalise(model.units);
+  }
+
+  // Ends the search after a refused step from which none leads on. The error of the model's cost falls with the square
+  // of the step where the cost is smooth, and with its length at a kink.
+  bool is_last(const Trial& trial, const LinearModel& model, const VectorXd& d) {
+    if (!trial.point.ok && ++invalid_ == kInvalidSteps) {
+      end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
+      return true;
+    }
+    const double length = model.units.cwiseProduct(d).norm(), miss = std::abs(trial.promised - trial.gained);
+    if (missed_ > 0 && miss < kSimulationNoise * model.size && miss > std::sqrt(length / missed_) * missed_by_) {
+      end(SolverStatus::converged,
+          fmt::format("converged: errors of the simulation change the cost by {:.1g}, more than the {:.1g} that the "
+                      "derivatives promise",
+                      miss, trial.promised));
+      return true;
+    }
+    missed_ = std::isfinite(miss) ? length : 0, missed_by_ = miss;
+    return false;
+  }
+
+  // Uses the parabola through both costs with the slope at the start.
+  VectorXd shorter_step(const LinearModel& model, const VectorXd& d, const Trial& trial) {
+    const double slope = model.gradient.dot(d);
+    const double part =
+        std::isfinite(trial.cost) ? std::clamp(-slope / (2 * (trial.cost - cost_ - slope)), 0.1, 0.5) : 0.25;
+    const double longest = part * model.units.cwiseProduct(d).norm();
+    VectorXd shorter;
+    do {
+      lambda_ *= 2;
+      shorter = step(model, lambda_);
+    } while (model.units.cwiseProduct(shorter).norm() > longest);
+    return shorter;
   }
 
   // The weights are those of the residuals z + J d after the step (levenberg_marquardt.hpp).
@@ -382,7 +413,9 @@ class Search {
   LeastSquaresResult result_;
   VectorXd x_;
   LeastSquaresPoint point_;
-  double cost_ = 0, first_size_ = 0;
+  double cost_ = 0, first_size_ = 0, lambda_ = kFirstDamping;
+  int invalid_ = 0;                    // trials in a row that could not be evaluated
+  double missed_ = 0, missed_by_ = 0;  // length of the step refused last at this point, and what its model missed
   LearntCurvature own_;
   LearntCurvature& learnt_;
   VectorXd last_step_, change_;  // s and (J+ - J) s; empty where residuals are not large
