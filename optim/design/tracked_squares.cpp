@@ -105,6 +105,24 @@ SimulationResult TrackedSquares::with_tangents(const Mechanism& mechanism, const
   return simulate_tlm(mechanism, settings, {}, sampling, options);
 }
 
+std::vector<TrackedSquares::Taken> TrackedSquares::taken_in(std::size_t c,
+                                                            const std::vector<Objective::Instant>& instants,
+                                                            Index first, double weight) const {
+  std::vector<Taken> taken;
+  const std::vector<Objective::Sample>& rows = minimised(evaluator_, c).residuals();
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    taken.push_back({instants[i].time, &rows[i].value, first + static_cast<Index>(i), weight});
+  const Index limits = program_.constraints() / static_cast<Index>(evaluator_.cases());
+  for (Index i = 0; i < limits; ++i) {
+    const Index constraint = static_cast<Index>(c) * limits + i;
+    const Objective& limited = evaluator_.of_case(c).objectives()[static_cast<std::size_t>(1 + i)];
+    for (const Objective::Sample& sample : limited.samples())
+      taken.push_back({sample.time, &sample.value, residuals_ + constraint, 1 / program_.size(constraint)});
+  }
+  std::ranges::stable_sort(taken, {}, &Taken::time);
+  return taken;
+}
+
 void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
   const auto go_on = [&](double t) {
     abandoned_ =
@@ -122,23 +140,7 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     for (const int k : evaluator.variables()) active[static_cast<std::size_t>(k)] = true;
     const Mechanism mechanism(evaluator.scene(), rho, active, evaluator.options().user_forces, evaluator.programs());
     const std::vector<Objective::Instant> instants = objective.instants_of(rows, mechanism, go_on);
-    const double weight = std::sqrt(weights(static_cast<Index>(c)));
-    struct Taken {
-      double time;
-      const CostExpression* value;
-      Index row;
-      double factor;  // of the value in the row
-    };
-    std::vector<Taken> taken;
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      taken.push_back({instants[i].time, &rows[i].value, first + static_cast<Index>(i), weight});
-    const Index limits = program_.constraints() / static_cast<Index>(evaluator_.cases());
-    for (Index i = 0; i < limits; ++i) {
-      const Index constraint = static_cast<Index>(c) * limits + i;
-      for (const Objective::Sample& sample : evaluator.objectives()[static_cast<std::size_t>(1 + i)].samples())
-        taken.push_back({sample.time, &sample.value, residuals_ + constraint, 1 / program_.size(constraint)});
-    }
-    std::ranges::stable_sort(taken, {}, &Taken::time);
+    const std::vector<Taken> taken = taken_in(c, instants, first, std::sqrt(weights(static_cast<Index>(c))));
     std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
     TangentSampling sampling;
     std::vector<const PointCost*> costs;

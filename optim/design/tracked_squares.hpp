@@ -27,6 +27,15 @@ class TrackedSquares : public LeastSquaresProblem {
   bool without_value() const { return without_value_; }  // whether a residual was not a number somewhere
 
  private:
+  struct Taken {
+    double time;
+    const CostExpression* value;
+    Eigen::Index row;
+    double factor;  // of the value in the row
+  };
+  // What is read along the run of case c, by time: its residuals, in rows from `first` on, and the sums of its limits.
+  std::vector<Taken> taken_in(std::size_t c, const std::vector<Objective::Instant>& instants, Eigen::Index first,
+                              double weight) const;
   void simulate(const Eigen::VectorXd& x, LeastSquaresPoint& point);
   SimulationResult with_tangents(const Mechanism& mechanism, const SimulationSettings& settings,
                                  const TangentSampling& sampling, const RunOptions& options);
