@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
 #include <stdexcept>
 #include <utility>
 
 #include "core/expression/counted.hpp"
 #include "optim/fit/angle_doubts.hpp"
+#include "optim/fit/distributions.hpp"
 #include "optim/fit/fit_assessment.hpp"
 #include "optim/fit/fit_context.hpp"
 #include "optim/fit/fit_search.hpp"
@@ -148,8 +150,25 @@ class Identification {
           "identification.loss: {} of {} lie beyond its scale, {:g} sigma: these are no outliers. Sigma is too small, "
           "the model is wrong, or the fit ended in another minimum",
           beyond, counted(stack.samples(), "sample"), stack.loss.s()));
+    doubt_sigmas();
     for (std::string& doubt : angle_doubts(fit_.scene, fit_.spec, fit_.data, stack, at_start, z))
       fit_.result.warnings.push_back(std::move(doubt));
+  }
+
+  // Intervals that rest on the given sigmas. Beyond a factor of 2 an interval of 95 % holds the truth in 67 % at most.
+  void doubt_sigmas() {
+    constexpr double kFactor = 2, kChance = 1e-3;  // of so large or small a sum of squares
+    const FitStatistics& s = fit_.result.statistics;
+    const bool by_sigmas = fit_.spec.sigma_is_known && s.variance == 1 && s.covariance_type == CovarianceType::white;
+    if (!by_sigmas || fit_.options.preflight || !(s.degrees_of_freedom > 0)) return;
+    const double freedom = static_cast<double>(s.degrees_of_freedom), size = std::sqrt(s.residual_variance);
+    if (size <= kFactor && size >= 1 / kFactor) return;
+    const double above = chi_squared_tail(freedom, freedom * s.residual_variance);
+    if (std::min(above, 1 - above) > kChance) return;
+    fit_.result.warnings.push_back(fmt::format(
+        "identification.sigma_is_known: residuals are {:.2g} sigma (rms), but standard errors and intervals rest on "
+        "sigma. {}; without sigma_is_known they rest on the residuals",
+        size, size > 1 ? "Sigma is too small, or the model is wrong" : "Sigma is too large"));
   }
 
   void order_residuals() {

@@ -163,6 +163,26 @@ TEST_CASE("a normal prior pulls as one more measurement of the parameter", "[ide
   CHECK(result.statistics.degrees_of_freedom == 301);
 }
 
+TEST_CASE("residuals that known sigmas do not explain are a warning", "[identification]") {
+  const auto warned = [](double sigma, bool is_known) {
+    Problem p = fit_problem();
+    p.identification->sigma_is_known = is_known;
+    p.identification->covariance = CovarianceType::white;
+    p.identification->experiments[0].channels[0].sigma = sigma;
+    const IdentificationResult result = run_identification(p, {noisy(3)});
+    REQUIRE(result.ok());
+    std::string found;
+    for (const std::string& warning : result.warnings)
+      if (warning.find("sigma_is_known") != std::string::npos) found = warning;
+    return found;
+  };
+  CHECK(warned(kSigma, true).empty());
+  CHECK(warned(kSigma / 1.5, true).empty());
+  CHECK(warned(kSigma / 4, false).empty());
+  CHECK_THAT(warned(kSigma / 4, true), Contains("residuals are 4") && Contains("Sigma is too small, or the model"));
+  CHECK_THAT(warned(4 * kSigma, true), Contains("residuals are 0.25 sigma") && Contains("Sigma is too large"));
+}
+
 TEST_CASE("a prior decides what the data leave open, for each free value by itself", "[identification][prior]") {
   Problem p = fit_problem(64, 0.055);
   testing::add_parameters(p.scene, {{"m_arm", 0.4}});
