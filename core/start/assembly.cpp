@@ -189,10 +189,8 @@ struct Assembly::Solution {
     MatrixXd q_b_rho, q_g_rho, v_b_rho, v_g_rho;
     std::vector<Mat<7, 4>> v_g_q;  // per body, in its own p
   };
-  bool is_sparse() const {
-    constexpr int kManyBodies = 12;
-    return data.n >= kManyBodies && !q->linearised && !v->linearised;
-  }
+  static constexpr int kManyBodies = 12;
+  bool is_sparse() const { return data.n >= kManyBodies && !q->linearised && !v->linearised; }
   Sparse sparse_derivatives() const {
     const Index N = layout.positions();
     AssemblyEquations::SparseGradients F = position.sparse_gradients(result.y), G = velocity.sparse_gradients(result.y);
@@ -400,6 +398,16 @@ std::vector<int> Assembly::obstructed() const {
     if (unmet[static_cast<std::size_t>(k)]) parameters.push_back(static_cast<int>(k));
   }
   return parameters;
+}
+
+double Assembly::rounding() const {
+  Solution& s = *solution_;
+  if (!s.result.ok || s.data.equilibrium || s.data.n >= Solution::kManyBodies) return 0;
+  s.linearise_both();
+  const Solution::Derivatives d = s.derivatives();
+  const NearestPointLinearisation &q = s.q->linearisation, &v = s.v->linearisation;
+  const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho), v_g = d.v_g_q * q_rho + d.v_g_rho;
+  return std::max(q.rounding(q_rho, d.q_g_rho), v.rounding(v.solve(d.v_b_q * q_rho + d.v_b_rho, v_g), v_g));
 }
 
 int Assembly::degrees_of_freedom() const {

@@ -43,6 +43,10 @@ class Assembly {
   // Parameters that cannot change by themselves. A change would make redundant equations contradict each other (one of
   // two parallel cranks longer than the other). The state has no derivative with respect to them.
   std::vector<int> obstructed() const;
+  // The rounding of dy/drho, relative to the largest entry of a column (lengths in units of the mechanism's): about
+  // 1e-14 in metres, more where lengths are far from 1 m. It is 0 where nothing is free, and not estimated for many
+  // bodies.
+  double rounding() const;
 
  private:
   struct Solution;

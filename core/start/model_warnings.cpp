@@ -237,6 +237,17 @@ void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::st
       far, arm, rounding / arm));
 }
 
+// Places and turns weigh alike in what is nearest to the guess, so that those of lengths far from 1 m lose digits.
+void add_rounding_of_derivatives(const Assembly& assembly, std::vector<std::string>& warnings) {
+  constexpr double kNoticeable = 1e-7;  // methods and differences agree to this elsewhere
+  const double rounding = assembly.rounding();
+  if (!(rounding > kNoticeable)) return;
+  warnings.push_back(
+      fmt::format("the derivatives of the initial state carry rounding of about {:.0e} of their size, and gradients "
+                  "with them: the lengths are far from 1 m. Write the problem in units in which they are near 1",
+                  rounding));
+}
+
 void add_violations(const MechanismData& d, std::vector<std::string>& warnings) {
   double size = 0;
   for (const Constraint& c : d.constraints) {
@@ -305,6 +316,7 @@ std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assemb
   add_massless(d, q, warnings);
   add_springs(d, assembly.result().y, warnings);
   add_reactions(mechanism, assembly.result(), warnings);
+  add_rounding_of_derivatives(assembly, warnings);
   return warnings;
 }
 

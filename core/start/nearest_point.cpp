@@ -170,6 +170,21 @@ void NearestPointLinearisation::solve_transposed(const Eigen::Ref<const MatrixXd
   b_bar = multipliers(x_bar - H_.transpose() * g_bar);
 }
 
+double NearestPointLinearisation::rounding(const Eigen::Ref<const MatrixXd>& x,
+                                           const Eigen::Ref<const MatrixXd>& g) const {
+  if (Z_.cols() == 0) return 0;
+  const MatrixXd terms = Z_.cwiseAbs().transpose() * (g.cwiseAbs() + H_.cwiseAbs() * x.cwiseAbs());
+  const MatrixXd along = lambda_.cwiseAbs().cwiseInverse().asDiagonal() * (V_.cwiseAbs().transpose() * terms);
+  const MatrixXd error = sizes_.cwiseInverse().asDiagonal() * ((Z_ * V_).cwiseAbs() * along);
+  const MatrixXd sized = sizes_.cwiseInverse().asDiagonal() * x;
+  double worst = 0;
+  for (Eigen::Index k = 0; k < x.cols(); ++k) {
+    if (const double size = sized.col(k).lpNorm<Eigen::Infinity>(); size > 0)
+      worst = std::max(worst, kEpsilon * error.col(k).maxCoeff() / size);
+  }
+  return worst;
+}
+
 VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g) const {
   constexpr double kPositive = 1e-6, kFloor = 0.1;
   const VectorXd x = pseudo_inverse_times(b);

@@ -75,6 +75,9 @@ class NearestPointLinearisation {
   // The adjoint: finds b_bar and g_bar with x_bar'x' = b_bar'b + g_bar'g.
   void solve_transposed(const Eigen::Ref<const Eigen::MatrixXd>& x_bar, Eigen::MatrixXd& b_bar,
                         Eigen::MatrixXd& g_bar) const;
+  // The rounding of x = solve(b, g), whose part along Z sums large terms: eps |Z| |Z'HZ|^-1 |Z|'(|g| + |H| |x|). The
+  // largest over all unknowns and columns, each relative to the largest unknown, in units of the sizes.
+  double rounding(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<const Eigen::MatrixXd>& g) const;
   // Solves with the eigenvalues of Z'HZ made positive: a descent direction of the merit function everywhere.
   Eigen::VectorXd descent(const Eigen::VectorXd& b, const Eigen::VectorXd& g) const;
 
