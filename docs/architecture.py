@@ -16,7 +16,8 @@ INCLUDE = re.compile(r'^#include "((?:core|optim|app)/[^"]+)"', re.M)
 TYPE = re.compile(r"^ *(?:template *<.*> *)?(?:struct|class|enum class) +(\w+)(?: final)?(?: *:[^:;]*)?(?: *:[^:;].*)? *\{", re.M)
 
 # A path as pages and comments write it; some leave the ending out, and some stand for several files.
-PATH = re.compile(r"(?<![\w/.])(?:core|optim|app|tests|bench|docs|problems|data|examples|cmake)/[\w./-]*\w(?![\w{*-]|/?[{*])")
+PATH = re.compile(r"(?<![\w/.])(?:core|optim|app|tests|bench|docs|problems|data|examples|cmake)/"
+                  r"[\w./-]*\w(?![\w{*-]|/?[{*])")
 ENDINGS = ("", ".hpp", ".cpp", ".md", ".py", ".json")
 
 
@@ -56,7 +57,8 @@ def circles(includes):
 def stale_names():
     """The paths that pages and sources name, and that do not exist."""
     pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-    sources = [path for top in ("core", "optim", "app", "tests", "bench") for path in sorted((ROOT / top).rglob("*.[ch]pp"))]
+    tops = ("core", "optim", "app", "tests", "bench")
+    sources = [path for top in tops for path in sorted((ROOT / top).rglob("*.[ch]pp"))]
     for page in pages + sources:
         for path in sorted(set(PATH.findall(page.read_text()))):
             if "NAME" not in path and not any((ROOT / (path + ending)).exists() for ending in ENDINGS):
@@ -89,7 +91,8 @@ def main():
         print(f"{name:<20}{counts[name][0]:>6}{counts[name][1]:>8}{counts[name][2]:>7}")
     print(f"{'all':<20}" + "".join(f"{sum(c[k] for c in counts.values()):>{w}}" for k, w in enumerate((6, 8, 7))))
     wrong += stale_names()
-    print("\n".join(wrong) if wrong else "no include against the order of docs/architecture.md, no circle, no stale path")
+    well = "no include against the order of docs/architecture.md, no circle, no stale path"
+    print("\n".join(wrong) if wrong else well)
     return 1 if wrong else 0
 
 

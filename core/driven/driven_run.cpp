@@ -87,7 +87,7 @@ void DrivenRun::go(const Take& take) {
   if (!result_.psi.allFinite()) stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi));
 }
 
-// What the panels of a run share.
+// A Course holds what one panel of a run leaves to the next.
 struct DrivenRun::Course {
   EventTimes events;
   std::optional<JumpWatch> jumps;

@@ -268,7 +268,7 @@ struct Assembly::Solution {
     position.settle_shared_rows(result.y, result.angles);
   }
 
-  // Right-hand sides of both linear systems (nearest_point.hpp). Those of v need q' as well:
+  // Right-hand sides of both linear systems (nearest_point_linearisation.hpp). Those of v need q' as well:
   //   J_q q' = -q_F_rho,           H_q q' + .. = q_g_rho
   //   J_v v' = -F_q q' - F_rho,    H_v v' + .. = g_q q' + g_rho
   struct Derivatives {

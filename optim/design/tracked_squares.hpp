@@ -33,7 +33,7 @@ class TrackedSquares : public LeastSquaresProblem {
     Eigen::Index row;
     double factor;  // of the value in the row
   };
-  // What is read along the run of case c, by time: its residuals, in rows from `first` on, and the sums of its limits.
+  // Lists the values that the run of case c is read for, by time: residuals, in rows from `first` on, and limits.
   std::vector<Taken> taken_in(std::size_t c, const std::vector<Objective::Instant>& instants, Eigen::Index first,
                               double weight) const;
   void simulate(const Eigen::VectorXd& x, LeastSquaresPoint& point);

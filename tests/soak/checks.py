@@ -393,7 +393,7 @@ def other_commands(lab):
     """Commands that only have to end in numbers or words."""
     lab.run("validate")
     if lab.problem.get("parameters"):
-        # CVODES chooses its steps by rtol alone; a start that a parameter moves by 1e8 of itself magnifies their errors.
+        # CVODES chooses its steps by rtol alone. A start that a parameter moves by 1e8 of itself magnifies errors.
         forward = [("cvodes_forward", "scene", {"simulation.integrator.rtol": rtol}) for rtol in (1e-11, 1e-13)]
         found = compare_by_steps(lab, "cvodes_forward = adjoint", forward[0], ("adjoint", "scene", {}), 1e-4, 1e-8)
         found = found and compare_by_steps(lab, "cvodes_forward = adjoint", forward[1], ("adjoint", "scene", {}),

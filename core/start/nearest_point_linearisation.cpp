@@ -1,0 +1,196 @@
+#include "core/start/nearest_point_linearisation.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+namespace mbsopt {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kRelativeRounding = std::numeric_limits<double>::epsilon();
+
+// An orthonormal basis of { x : J x / sizes = 0 }. The columns of W, orthonormal in units of the sizes, span it.
+// Columns that turn no body (or, if lengths are large, move none) have a part of rounding in p (in r). In the units of
+// x this part is eps/L for lengths L. It multiplies the large g of p beside the small g of r, so a part eps/L^2 of r
+// would be wrong. The part is therefore set to zero exactly, unless J needs it. J needs the part of z if J times the
+// rest exceeds rounding; then z - J+ J z contains it.
+MatrixXd orthonormal_null_space(const MatrixXd& J, const OrthogonalDecomposition& J_transposed, const VectorXd& sizes) {
+  const MatrixXd W = J_transposed.left_null_space();
+  const double heavy = sizes.size() > 0 ? sizes.maxCoeff() : 0;
+  std::vector<Eigen::Index> heavy_rows;
+  for (Eigen::Index i = 0; i < sizes.size(); ++i) {
+    if (sizes(i) == heavy) heavy_rows.push_back(i);
+  }
+  if (W.size() == 0 || heavy_rows.size() == static_cast<std::size_t>(sizes.size())) return orthonormal_columns(W);
+  const LeftSingular parts = left_singular(W(heavy_rows, Eigen::all).transpose());
+  const Eigen::Index both = (parts.values.array() > NearestPointLinearisation::kRankThreshold).count();
+  MatrixXd light = W * parts.U.rightCols(W.cols() - both);
+  light(heavy_rows, Eigen::all).setZero();
+  const MatrixXd heavy_part = -J_transposed.solve_transposed(J * light), left = J * heavy_part;
+  const double rounding = static_cast<double>(J.cols()) * kRelativeRounding;  // of sums along a row of length 1
+  Eigen::Index coupled = 0;
+  MatrixXd U = MatrixXd::Identity(light.cols(), light.cols());
+  if (left.size() > 0 && left.lpNorm<Eigen::Infinity>() > rounding) {
+    LeftSingular couplings = left_singular(left.transpose());
+    coupled = (couplings.values.array() > rounding).count();
+    U = std::move(couplings.U);
+  }
+  MatrixXd mixed(W.rows(), both + coupled), Z(W.rows(), W.cols());
+  mixed << W * parts.U.leftCols(both), (light + heavy_part) * U.leftCols(coupled);
+  Z << orthonormal_columns(sizes.asDiagonal() * mixed), orthonormal_columns(light * U.rightCols(U.cols() - coupled));
+  return Z;
+}
+
+// Rows of J and unknowns that their entries join.
+struct Part {
+  std::vector<Eigen::Index> rows, unknowns;
+};
+
+std::vector<Part> parts_of(const MatrixXd& J) {
+  std::vector<std::size_t> joined(static_cast<std::size_t>(J.cols()));
+  std::iota(joined.begin(), joined.end(), std::size_t{0});
+  const auto root = [&](std::size_t k) {
+    while (joined[k] != k) k = joined[k] = joined[joined[k]];
+    return k;
+  };
+  std::vector<std::size_t> of_row(static_cast<std::size_t>(J.rows()), joined.size());  // size(): no entry
+  for (Eigen::Index i = 0; i < J.rows(); ++i) {
+    std::size_t& first = of_row[static_cast<std::size_t>(i)];
+    for (Eigen::Index k = 0; k < J.cols(); ++k) {
+      if (J(i, k) == 0) continue;
+      const std::size_t other = root(static_cast<std::size_t>(k));
+      first = first == joined.size() ? other : joined[other] = root(first);
+    }
+  }
+  std::vector<Part> of_root(joined.size()), parts;
+  for (std::size_t k = 0; k < joined.size(); ++k) of_root[root(k)].unknowns.push_back(static_cast<Eigen::Index>(k));
+  for (std::size_t i = 0; i < of_row.size(); ++i) {
+    if (of_row[i] < joined.size()) of_root[root(of_row[i])].rows.push_back(static_cast<Eigen::Index>(i));
+  }
+  std::ranges::copy_if(of_root, std::back_inserter(parts), [](const Part& part) { return !part.unknowns.empty(); });
+  return parts;
+}
+
+// Does the same part by part, so that each column is exactly zero outside its part. Rounding there would be multiplied
+// by the second derivatives of another part's equations, which in a mechanism of micrometres are 1e12 times larger.
+MatrixXd null_space_by_parts(const MatrixXd& J, const OrthogonalDecomposition& J_transposed, const VectorXd& sizes) {
+  const std::vector<Part> parts = parts_of(J);
+  if (parts.size() == 1) return orthonormal_null_space(J, J_transposed, sizes);
+  MatrixXd Z = MatrixXd::Zero(J.cols(), J.cols());
+  Eigen::Index columns = 0;
+  for (const Part& part : parts) {
+    const MatrixXd own = J(part.rows, part.unknowns);
+    const OrthogonalDecomposition decomposed(own.transpose(), NearestPointLinearisation::kRankThreshold);
+    const MatrixXd free = orthonormal_null_space(own, decomposed, sizes(part.unknowns));
+    Z(part.unknowns, Eigen::seqN(columns, free.cols())) = free;
+    columns += free.cols();
+  }
+  return Z.leftCols(columns);
+}
+
+}  // namespace
+
+NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J)
+    : NearestPointLinearisation(J, VectorXd::Ones(J.cols())) {}
+NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const VectorXd& sizes)
+    : J_(J), scale_(J.rows()), sizes_(sizes) {
+  const MatrixXd sized = J * sizes.asDiagonal();
+  for (Eigen::Index i = 0; i < J.rows(); ++i) {
+    const double norm = sized.row(i).norm();
+    scale_(i) = norm > 0 ? 1 / norm : 1.0;
+  }
+  const MatrixXd scaled = scale_.asDiagonal() * sized;
+  J_transposed_ = OrthogonalDecomposition(scaled.transpose(), kRankThreshold);
+  Z_ = null_space_by_parts(scaled, J_transposed_, sizes);
+}
+
+MatrixXd NearestPointLinearisation::multipliers(const Eigen::Ref<const MatrixXd>& g) const {
+  return scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
+}
+// Rounding leaves an error of eps L in r and eps in p. So the rows of the smaller size (r of tiny mechanisms) determine
+// the part of nu that they can. The other rows determine the rest, which is larger. A second pass over the first rows
+// removes its rounding.
+VectorXd NearestPointLinearisation::multipliers_at(const VectorXd& away) const {
+  const double smallest = sizes_.minCoeff();
+  if (smallest == sizes_.maxCoeff()) return multipliers(away);
+  std::vector<Eigen::Index> fine, coarse;
+  for (Eigen::Index i = 0; i < sizes_.size(); ++i) (sizes_(i) == smallest ? fine : coarse).push_back(i);
+  const MatrixXd A = sizes_.asDiagonal() * J_.transpose() * scale_.asDiagonal();
+  const VectorXd b = sizes_.cwiseProduct(away);
+  const MatrixXd A_fine = A(fine, Eigen::all), A_coarse = A(coarse, Eigen::all);
+  const OrthogonalDecomposition fine_rows(A_fine, kRankThreshold);
+  VectorXd nu = fine_rows.solve(b(fine));
+  const MatrixXd N = mbsopt::null_space(A_fine, kRankThreshold);
+  if (N.cols() > 0) {
+    nu += N * OrthogonalDecomposition(A_coarse * N, kRankThreshold).solve(b(coarse) - A_coarse * nu);
+    nu += fine_rows.solve(b(fine) - A_fine * nu);
+  }
+  return scale_.cwiseProduct(nu);
+}
+MatrixXd NearestPointLinearisation::particular(const Eigen::Ref<const MatrixXd>& b) const {
+  return sizes_.asDiagonal() * J_transposed_.solve_transposed(scale_.asDiagonal() * b);
+}
+MatrixXd NearestPointLinearisation::pseudo_inverse_times(const Eigen::Ref<const MatrixXd>& b) const {
+  const MatrixXd x = particular(b);
+  return x - Z_ * (Z_.transpose() * x);
+}
+
+void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
+  H_ = H;
+  if (Z_.cols() == 0) {
+    lambda_.resize(0);
+    V_.resize(0, 0);
+    return;
+  }
+  const MatrixXd M = Z_.transpose() * H * Z_;
+  auto [values, vectors] = symmetric_eigen(0.5 * (M + M.transpose()));
+  lambda_ = std::move(values);
+  V_ = std::move(vectors);
+}
+
+MatrixXd NearestPointLinearisation::solve(const Eigen::Ref<const MatrixXd>& b,
+                                          const Eigen::Ref<const MatrixXd>& g) const {
+  const MatrixXd x = particular(b);
+  const MatrixXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
+  return x + Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
+}
+
+void NearestPointLinearisation::solve_transposed(const Eigen::Ref<const MatrixXd>& x_bar, MatrixXd& b_bar,
+                                                 MatrixXd& g_bar) const {
+  const MatrixXd w = V_.transpose() * (Z_.transpose() * x_bar);
+  g_bar = Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
+  b_bar = multipliers(x_bar - H_.transpose() * g_bar);
+}
+
+double NearestPointLinearisation::rounding(const Eigen::Ref<const MatrixXd>& x,
+                                           const Eigen::Ref<const MatrixXd>& g) const {
+  if (Z_.cols() == 0) return 0;
+  const MatrixXd terms = Z_.cwiseAbs().transpose() * (g.cwiseAbs() + H_.cwiseAbs() * x.cwiseAbs());
+  const MatrixXd along = lambda_.cwiseAbs().cwiseInverse().asDiagonal() * (V_.cwiseAbs().transpose() * terms);
+  const MatrixXd error = sizes_.cwiseInverse().asDiagonal() * ((Z_ * V_).cwiseAbs() * along);
+  const MatrixXd sized = sizes_.cwiseInverse().asDiagonal() * x;
+  double worst = 0;
+  for (Eigen::Index k = 0; k < x.cols(); ++k) {
+    if (const double size = sized.col(k).lpNorm<Eigen::Infinity>(); size > 0)
+      worst = std::max(worst, kRelativeRounding * error.col(k).maxCoeff() / size);
+  }
+  return worst;
+}
+
+VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g) const {
+  constexpr double kPositive = 1e-6, kFloor = 0.1;
+  const VectorXd x = pseudo_inverse_times(b);
+  VectorXd lambda = lambda_;
+  if (lambda.size() > 0 && lambda(0) < kPositive) lambda = lambda.cwiseAbs().cwiseMax(kFloor);
+  const VectorXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
+  return x + Z_ * (V_ * w.cwiseQuotient(lambda));
+}
+
+}  // namespace mbsopt
