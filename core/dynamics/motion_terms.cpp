@@ -117,7 +117,7 @@ void MotionTerms::acceleration_errors(Eigen::VectorXd& out) {
 }
 
 double MotionTerms::usual_acceleration(double enough) const {
-  double largest = 1e-9;
+  double largest = std::max(1e-9, data_.gravity.norm());
   for (std::size_t k = 1; k < bodies.size() && !(largest >= enough); ++k) {
     const BodyData& b = data_.bodies[k];
     const Vec<6>& load = f[k - 1];

@@ -69,8 +69,8 @@ class MotionTerms {
 
   // For statics: laws of time keep their values from now on.
   void hold_laws() { laws_.hold(); }
-  // Returns the largest acceleration of a single body by its loads or its own rotation. It stops at the first body that
-  // reaches `enough`.
+  // Returns the largest acceleration by gravity, by the loads of a single body or by its own rotation. It stops at the
+  // first that reaches `enough`.
   double usual_acceleration(double enough) const;
 
  private:

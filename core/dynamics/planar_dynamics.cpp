@@ -164,7 +164,7 @@ bool PlanarDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::V
 }
 
 double PlanarDynamics::usual_acceleration(double enough) const {
-  double largest = 1e-9;
+  double largest = std::max(1e-9, std::sqrt(squared_norm(model_.gravity)));
   for (std::size_t k = 1; k < bodies_.size() && !(largest >= enough); ++k) {
     const PlanarBody& b = model_.bodies[k];
     const Vec<3>& load = loads_[k - 1];

@@ -112,8 +112,10 @@ double RunGuard::relative_energy_drift() const {
 
 std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {
   for (int i = 1; i <= data_.n; ++i) {
+    const auto v = y.segment<7>(StateLayout{data_.n}.v(i));
+    const double speed2 = v.head<3>().squaredNorm(), turn2 = 4 * v.tail<4>().squaredNorm();
+    if (speed2 <= bounds_(0) * bounds_(0) && turn2 <= bounds_(1) * bounds_(1)) continue;
     const Eigen::Vector2d now = speeds(y, i, data_.n);
-    if ((now.array() <= bounds_.array()).all()) continue;
     return fmt::format(
         "body '{}' {} at t = {:.6g} s: the motion grows beyond all bounds. Look for a negative damping or stiffness, a "
         "law of a drive or force that grows without end, or a unit; where steps are fixed, use a smaller step",
