@@ -22,6 +22,9 @@ function(mbsopt_compile_options target)
     target_compile_options(${target} PRIVATE -Wno-restrict -Wno-stringop-overflow -Wno-array-bounds)  # false alarms
                                              # on "a" + std::string: GCC bug 105651
   endif()
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)  # collects its garbage from 1 GB on: a tenth less time, a fifth more memory
+    target_compile_options(${target} PRIVATE "SHELL:--param ggc-min-heapsize=1048576")
+  endif()
   if(MBSOPT_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

@@ -111,7 +111,7 @@ NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const Ve
   Z_ = null_space_by_parts(scaled, J_transposed_, sizes);
 }
 
-MatrixXd NearestPointLinearisation::multipliers(const Eigen::Ref<const MatrixXd>& g) const {
+MatrixXd NearestPointLinearisation::multipliers(const MatrixXd& g) const {
   return scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
 }
 // Rounding leaves an error of eps L in r and eps in p. So the rows of the smaller size (r of tiny mechanisms) determine
@@ -134,12 +134,12 @@ VectorXd NearestPointLinearisation::multipliers_at(const VectorXd& away) const {
   }
   return scale_.cwiseProduct(nu);
 }
-MatrixXd NearestPointLinearisation::particular(const Eigen::Ref<const MatrixXd>& b) const {
+MatrixXd NearestPointLinearisation::particular(const MatrixXd& b) const {
   return sizes_.asDiagonal() * J_transposed_.solve_transposed(scale_.asDiagonal() * b);
 }
-MatrixXd NearestPointLinearisation::pseudo_inverse_times(const Eigen::Ref<const MatrixXd>& b) const {
-  const MatrixXd x = particular(b);
-  return x - Z_ * (Z_.transpose() * x);
+MatrixXd NearestPointLinearisation::pseudo_inverse_times(const MatrixXd& b) const {
+  const MatrixXd x = particular(b), along = Z_.transpose() * x;
+  return x - Z_ * along;
 }
 
 void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
@@ -149,48 +149,52 @@ void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
     V_.resize(0, 0);
     return;
   }
-  const MatrixXd M = Z_.transpose() * H * Z_;
+  const MatrixXd HZ = H * Z_, M = Z_.transpose() * HZ;
   auto [values, vectors] = symmetric_eigen(0.5 * (M + M.transpose()));
   lambda_ = std::move(values);
   V_ = std::move(vectors);
 }
 
-MatrixXd NearestPointLinearisation::solve(const Eigen::Ref<const MatrixXd>& b,
-                                          const Eigen::Ref<const MatrixXd>& g) const {
-  const MatrixXd x = particular(b);
-  const MatrixXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
-  return x + Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
+// Z V inv(lambda) V'Z' gap, by products of plain matrices: each other form of a product is compiled anew.
+MatrixXd NearestPointLinearisation::free_part(const VectorXd& lambda, const MatrixXd& gap) const {
+  const MatrixXd reduced = Z_.transpose() * gap;
+  MatrixXd modes = V_.transpose() * reduced;
+  modes.array().colwise() /= lambda.array();
+  const MatrixXd free = V_ * modes;
+  return Z_ * free;
 }
 
-void NearestPointLinearisation::solve_transposed(const Eigen::Ref<const MatrixXd>& x_bar, MatrixXd& b_bar,
-                                                 MatrixXd& g_bar) const {
-  const MatrixXd w = V_.transpose() * (Z_.transpose() * x_bar);
-  g_bar = Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
+MatrixXd NearestPointLinearisation::solve(const MatrixXd& b, const MatrixXd& g) const {
+  const MatrixXd x = particular(b), gap = g - H_ * x;
+  return x + free_part(lambda_, gap);
+}
+
+void NearestPointLinearisation::solve_transposed(const MatrixXd& x_bar, MatrixXd& b_bar, MatrixXd& g_bar) const {
+  g_bar = free_part(lambda_, x_bar);
   b_bar = multipliers(x_bar - H_.transpose() * g_bar);
 }
 
-double NearestPointLinearisation::rounding(const Eigen::Ref<const MatrixXd>& x,
-                                           const Eigen::Ref<const MatrixXd>& g) const {
+double NearestPointLinearisation::rounding(const MatrixXd& x, const MatrixXd& g) const {
   if (Z_.cols() == 0) return 0;
-  const MatrixXd terms = Z_.cwiseAbs().transpose() * (g.cwiseAbs() + H_.cwiseAbs() * x.cwiseAbs());
-  const MatrixXd along = lambda_.cwiseAbs().cwiseInverse().asDiagonal() * (V_.cwiseAbs().transpose() * terms);
-  const MatrixXd error = sizes_.cwiseInverse().asDiagonal() * ((Z_ * V_).cwiseAbs() * along);
-  const MatrixXd sized = sizes_.cwiseInverse().asDiagonal() * x;
+  const MatrixXd Z = Z_.cwiseAbs(), V = V_.cwiseAbs(), H = H_.cwiseAbs(), x_size = x.cwiseAbs(), ZV = Z_ * V_;
+  const MatrixXd terms = g.cwiseAbs() + H * x_size, reduced = Z.transpose() * terms;
+  MatrixXd along = V.transpose() * reduced;
+  along.array().colwise() /= lambda_.array().abs();
+  const MatrixXd modes = ZV.cwiseAbs(), error = modes * along;
   double worst = 0;
   for (Eigen::Index k = 0; k < x.cols(); ++k) {
-    if (const double size = sized.col(k).lpNorm<Eigen::Infinity>(); size > 0)
-      worst = std::max(worst, kRelativeRounding * error.col(k).maxCoeff() / size);
+    const double size = x_size.col(k).cwiseQuotient(sizes_).maxCoeff();
+    if (size > 0) worst = std::max(worst, kRelativeRounding * error.col(k).cwiseQuotient(sizes_).maxCoeff() / size);
   }
   return worst;
 }
 
 VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g) const {
   constexpr double kPositive = 1e-6, kFloor = 0.1;
-  const VectorXd x = pseudo_inverse_times(b);
+  const VectorXd x = pseudo_inverse_times(b), gap = g - H_ * x;
   VectorXd lambda = lambda_;
   if (lambda.size() > 0 && lambda(0) < kPositive) lambda = lambda.cwiseAbs().cwiseMax(kFloor);
-  const VectorXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
-  return x + Z_ * (V_ * w.cwiseQuotient(lambda));
+  return x + free_part(lambda, gap);
 }
 
 }  // namespace mbsopt

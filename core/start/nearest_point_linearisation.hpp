@@ -28,32 +28,30 @@ class NearestPointLinearisation {
   const Eigen::VectorXd& row_scale() const { return scale_; }
   const Eigen::VectorXd& sizes() const { return sizes_; }
   // Returns the part of b outside the range of J, rows of J scaled to unit length.
-  Eigen::MatrixXd left(const Eigen::Ref<const Eigen::MatrixXd>& b) const {
-    return scale_.asDiagonal() * (b - J_ * particular(b));
-  }
-  const Eigen::MatrixXd& null_space() const { return Z_; }                        // Z
-  Eigen::MatrixXd multipliers(const Eigen::Ref<const Eigen::MatrixXd>& g) const;  // least nu with J'nu = g
+  Eigen::MatrixXd left(const Eigen::MatrixXd& b) const { return scale_.asDiagonal() * (b - J_ * particular(b)); }
+  const Eigen::MatrixXd& null_space() const { return Z_; }      // Z
+  Eigen::MatrixXd multipliers(const Eigen::MatrixXd& g) const;  // least nu with J'nu = g
   // Returns nu with J'nu = x_guess - x, as exact as x is: to eps of each unknown's size.
   Eigen::VectorXd multipliers_at(const Eigen::VectorXd& away) const;
-  Eigen::MatrixXd pseudo_inverse_times(const Eigen::Ref<const Eigen::MatrixXd>& b) const;  // J+ b
+  Eigen::MatrixXd pseudo_inverse_times(const Eigen::MatrixXd& b) const;  // J+ b
 
   // Call this before solve and solve_transposed.
   void set_hessian(const Eigen::MatrixXd& H);
   // Eigenvalues of Z'HZ, ascending: all positive at a strict minimum.
   const Eigen::VectorXd& reduced_eigenvalues() const { return lambda_; }
 
-  Eigen::MatrixXd solve(const Eigen::Ref<const Eigen::MatrixXd>& b, const Eigen::Ref<const Eigen::MatrixXd>& g) const;
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& b, const Eigen::MatrixXd& g) const;
   // The adjoint: finds b_bar and g_bar with x_bar'x' = b_bar'b + g_bar'g.
-  void solve_transposed(const Eigen::Ref<const Eigen::MatrixXd>& x_bar, Eigen::MatrixXd& b_bar,
-                        Eigen::MatrixXd& g_bar) const;
+  void solve_transposed(const Eigen::MatrixXd& x_bar, Eigen::MatrixXd& b_bar, Eigen::MatrixXd& g_bar) const;
   // The rounding of x = solve(b, g), whose part along Z sums large terms: eps |Z| |Z'HZ|^-1 |Z|'(|g| + |H| |x|). The
   // largest over all unknowns and columns, each relative to the largest unknown, in units of the sizes.
-  double rounding(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<const Eigen::MatrixXd>& g) const;
+  double rounding(const Eigen::MatrixXd& x, const Eigen::MatrixXd& g) const;
   // Solves with the eigenvalues of Z'HZ made positive: a descent direction of the merit function everywhere.
   Eigen::VectorXd descent(const Eigen::VectorXd& b, const Eigen::VectorXd& g) const;
 
  private:
-  Eigen::MatrixXd particular(const Eigen::Ref<const Eigen::MatrixXd>& b) const;  // some x with J x = b
+  Eigen::MatrixXd particular(const Eigen::MatrixXd& b) const;  // some x with J x = b
+  Eigen::MatrixXd free_part(const Eigen::VectorXd& lambda, const Eigen::MatrixXd& gap) const;
 
   Eigen::MatrixXd J_;
   Eigen::VectorXd scale_, sizes_;         // of the rows and of the columns of J
