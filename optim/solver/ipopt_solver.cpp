@@ -57,7 +57,7 @@ class Adapter : public Ipopt::TNLP {
   bool start_is_valid() { return evaluate(x_start_); }
   bool out_of_evaluations() const { return out_of_evaluations_; }
   SearchEnd end() const { return end_; }  // the end of the last round, if chosen here
-  bool lost() const { return end_ == SearchEnd::wandering || end_ == SearchEnd::creeping; }
+  bool creeps() const { return end_ == SearchEnd::creeping; }
   bool second_order() const { return second_order_; }
   int left_newton_at() const { return left_newton_at_; }  // iteration; 0: never
 
@@ -220,8 +220,8 @@ class Adapter : public Ipopt::TNLP {
   // Ipopt would continue. A search without progress starts again, a few times. If Newton steps progress slowly, BFGS
   // replaces them.
   void look_at_iterate(double distance) {
-    end_ = watch_.look({iterate_, point_->f * problem_.f_scale, distance}, points_.best().f * problem_.f_scale);
-    if ((lost() && round_ >= kFreshStarts) || (end_ == SearchEnd::creeping && !second_order_)) end_ = SearchEnd::none;
+    end_ = watch_.look({iterate_, point_->f * problem_.f_scale, distance});
+    if (creeps() && (round_ >= kFreshStarts || !second_order_)) end_ = SearchEnd::none;
     if (end_ == SearchEnd::optimal) final_ = iterate_;
     if (end_ == SearchEnd::stalled) final_ = watch_.most_stationary().x;
   }
@@ -426,7 +426,7 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
     if (adapter->end() == SearchEnd::optimal) outcome = {SolverStatus::converged, kConverged};
     if (adapter->end() == SearchEnd::stalled) outcome = stalled_in_words(adapter->distance(), result, options);
     const bool ended = outcome.status == SolverStatus::converged || outcome.status == SolverStatus::no_progress;
-    if (!adapter->lost() && !(ended && adapter->passed_a_better_point())) break;
+    if (!adapter->creeps() && !(ended && adapter->passed_a_better_point())) break;
     adapter->go_on_from_best();
   }
   const double distance =

@@ -24,26 +24,17 @@ std::pair<double, double> range_of_f(Iterates::const_iterator begin, Iterates::c
 
 }  // namespace
 
-SearchEnd SearchWatch::look(const Iterate& iterate, double best_f) {
+SearchEnd SearchWatch::look(const Iterate& iterate) {
   if (iterate.distance <= tolerance_) return SearchEnd::optimal;
   recent_.push_back(iterate);
   if (recent_.size() > kCreeping + 1) recent_.pop_front();
-  const bool wandering = unconstrained_ && is_wandering(iterate.f, best_f);
   if (is_stalled()) return SearchEnd::stalled;
-  if (wandering) return SearchEnd::wandering;
   return unconstrained_ && is_creeping() ? SearchEnd::creeping : SearchEnd::none;
 }
-
-void SearchWatch::start_afresh() { recent_.clear(), without_better_ = 0; }
 
 const Iterate& SearchWatch::most_stationary() const {
   return *std::min_element(last(recent_, kStalled), recent_.end(),
                            [](const Iterate& a, const Iterate& b) { return a.distance < b.distance; });
-}
-
-bool SearchWatch::is_wandering(double f, double best_f) {
-  if (best_f < best_f_) best_f_ = best_f, without_better_ = 0;
-  return ++without_better_ > kWandering && f - best_f_ > tolerance_;
 }
 
 bool SearchWatch::is_stalled() const {
