@@ -18,6 +18,8 @@
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
+#include "core/start/assembly.hpp"
+#include "core/start/model_warnings.hpp"
 
 namespace mbsopt {
 namespace {
@@ -240,7 +242,9 @@ int design_command(const CommandContext& context) {
   }
   run.result["model"] = to_json(before.model);
   print_model(context.out, scene.name, before.model);
-  for (const std::string& warning : before.warnings) run.warn(warning);
+  const Mechanism mechanism(scene, parameter_values(scene));  // with derivatives, which the warnings look at
+  for (const std::string& warning : model_warnings(mechanism, Assembly(mechanism, scene.simulation.start_time)))
+    run.warn(warning);
 
   LongRun long_run(run);
   const auto [design, cut_off] = minimised(run, long_run, before.psi);

@@ -37,6 +37,7 @@ struct FormulationSettings {
   static FormulationSettings penalty() {  // MBSVT's form
     return {FormulationType::penalty, 1e9, 1, 10, 0, 0, Projection::none};
   }
+  bool operator==(const FormulationSettings&) const = default;
 };
 
 // Settings of step-size control and of Newton's method for experts. An absent value is the method's own. A value that
@@ -76,6 +77,8 @@ struct IntegratorSettings {
   std::optional<double> step;  // fixed step
   long max_steps = 10'000'000;
   IntegratorOptions options;
+
+  bool operator==(const IntegratorSettings&) const = default;
 };
 
 struct SimulationSettings {

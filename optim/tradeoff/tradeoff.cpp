@@ -36,13 +36,7 @@ std::vector<double> decades(int from, int to, int stride = 1) {
 
 // Whether runs of one scene are the same.
 bool same(const SimulationSettings& a, const SimulationSettings& b) {
-  const IntegratorSettings &i = a.integrator, &j = b.integrator;
-  const FormulationSettings &f = a.formulation, &g = b.formulation;
-  return i.type == j.type && i.rtol == j.rtol && i.atol == j.atol && i.rtol_of == j.rtol_of && i.atol_of == j.atol_of &&
-         i.step == j.step && i.initial_step == j.initial_step && i.max_step == j.max_step &&
-         i.max_steps == j.max_steps && i.options == j.options && f.type == g.type && f.alpha == g.alpha &&
-         f.xi == g.xi && f.omega == g.omega && f.iterations == g.iterations && f.tolerance == g.tolerance &&
-         f.linear_solver == g.linear_solver && f.projection == g.projection;
+  return a.integrator == b.integrator && a.formulation == b.formulation;
 }
 
 class Sweep {

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "app/terminal/exit_code.hpp"
+#include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 #include "tests/app/signal_handler.hpp"
 
@@ -141,6 +142,17 @@ TEST_CASE("design says of the start what simulate says of it", "[command]") {
   CHECK_THAT(run_command(simulate).err, apart);
   CHECK_THAT(run_design_command(file, folder.file("out"), more).err, apart);
   CHECK_THAT(json_of(folder.path / "out/result.json").at("warnings").dump(), apart);
+}
+
+TEST_CASE("design and gradient warn of rounding in the derivatives of a tiny mechanism's start", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = MBSOPT_SOURCE_DIR "/tests/soak/kept/117308.json";
+  const auto rounding = Contains("the derivatives of the initial state carry rounding of about 2e-05");
+  CHECK_THAT(run_command({"gradient", file, "--out", folder.file("gradient")}).err, rounding);
+  const CommandOutcome designed =
+      run_design_command(file, folder.file("out"), {"--set", R"(design={"minimize": "J1", "variables": ["p3"]})"});
+  CHECK(designed.exit_code == kDone);
+  CHECK_THAT(designed.err, rounding);
 }
 
 TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
