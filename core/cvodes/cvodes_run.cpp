@@ -277,6 +277,25 @@ void ForwardRun::count_steps() {
   s.linear_solves = flow_.evaluations() + linear_solver_.solves();
 }
 
+// One internal step from t to t1. Returns false, with the reason in the result, if there is none.
+bool ForwardRun::advance(double t, const Hooks& hooks, double& t1) {
+  count_steps();
+  if (result_.statistics.steps + result_.statistics.rejected >= settings_.integrator.max_steps) {
+    stop_for(CV_TOO_MUCH_WORK, t, "");
+    return false;
+  }
+  const double end = settings_.end_time;
+  t1 = t;
+  const int flag = hooks.advance ? hooks.advance(end, y_, &t1) : CVode(memory(), end, y_, &t1, CV_ONE_STEP);
+  flow_.thrown().throw_on();
+  if (flag < 0) {
+    stop_for(flag, t, "the accelerations or their derivatives");
+  } else if (t1 <= t) {
+    stop_for(CV_ERR_FAILURE, t, "");
+  }
+  return result_.ok();
+}
+
 void ForwardRun::go(std::span<const double> observed, const RunOptions& options, const Hooks& hooks) {
   if (!result_.ok()) return;
   const double end = settings_.end_time;
@@ -284,7 +303,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   const Energy e = energy(mechanism_.data(), y_now_, assembly_.result().angles);
   result_.statistics.energy_initial = result_.statistics.energy_final = e.kinetic + e.potential;
   require(CVodeSetStopTime(memory(), end));
-  double t = settings_.start_time;
+  double t = settings_.start_time, t1 = t;
   RunGuard guard(mechanism_.data());
   const std::string at_start = guard.begin(t, y_now_, e, end, settings_.integrator.max_steps);
   if (!at_start.empty()) return stop(SimulationStatus::not_credible, at_start);
@@ -295,23 +314,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     jumps->begin({t, y_now_, assembly_.result().angles, flow_.motion()});
   }
   Eigen::VectorXd y_before;
-  while (result_.ok() && t < end) {
-    count_steps();
-    if (result_.statistics.steps + result_.statistics.rejected >= settings_.integrator.max_steps) {
-      stop_for(CV_TOO_MUCH_WORK, t, "");
-      break;
-    }
-    double t1 = t;
-    const int flag = hooks.advance ? hooks.advance(end, y_, &t1) : CVode(memory(), end, y_, &t1, CV_ONE_STEP);
-    flow_.thrown().throw_on();
-    if (flag < 0) {
-      stop_for(flag, t, "the accelerations or their derivatives");
-      break;
-    }
-    if (t1 <= t) {
-      stop_for(CV_ERR_FAILURE, t, "");
-      break;
-    }
+  while (t < end && advance(t, hooks, t1)) {
     y_before = y_now_;
     y_now_ = *y_;
     if (!step_is_followed(t1 - t, y_now_)) break;
@@ -321,21 +324,20 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     flow_.accept(t1, y_now_);
     const Energy energy_now = update_statistics(t1, y_now_);
     std::string objection = guard.objection(t1, y_now_, energy_now, flow_.worst_residual());
-    if (objection.empty() && derivatives) {
-      objection = through_zero_length(mechanism_.data(), t, y_before, t1, y_now_);
-    }
+    if (objection.empty() && derivatives) objection = through_zero_length(mechanism_.data(), t, y_before, t1, y_now_);
     if (!objection.empty()) {
       stop(SimulationStatus::not_credible, objection);
       break;
     }
-    t = t1;
-    result_.last_good_time = t;
+    t = result_.last_good_time = t1;
     take_samples(schedule, t, hooks);
-    if (jumps) jumps->look_at({t, y_now_, flow_.angles_at(t), flow_.motion()});
-    if (hooks.accepted) hooks.accepted({t, y_now_, flow_.angles_at(t), flow_.motion()});
-    if (options.after_step) options.after_step({t, y_now_, flow_.angles_at(t), flow_.motion()});
+    const StatePoint here{t, y_now_, flow_.angles_at(t), flow_.motion()};
+    if (jumps) jumps->look_at(here);
+    if (hooks.accepted) hooks.accepted(here);
+    if (options.after_step) options.after_step(here);
     if (options.progress && !options.progress(t)) {
       stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", t));
+      break;
     }
   }
   count_steps();

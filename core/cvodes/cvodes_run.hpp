@@ -73,6 +73,7 @@ class ForwardRun {
   void set_up();
   bool step_is_followed(double h, const Eigen::VectorXd& y);
   Energy update_statistics(double t, const Eigen::VectorXd& y);
+  bool advance(double t, const Hooks& hooks, double& t1);
   void take_samples(SampleSchedule& schedule, double t, const Hooks& hooks);
   void finish_costs();
   void count_steps();  // rejected ones, and the work of their solutions

@@ -1,6 +1,7 @@
 #include "optim/objective/design_issues.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 #include "core/cvodes/cvodes.hpp"
 #include "core/scene/scene_path.hpp"
@@ -21,36 +22,66 @@ std::vector<DesignIssue> missing_bounds(const std::vector<std::string>& variable
   return issues;
 }
 
+namespace {
+
+void append(std::vector<DesignIssue>&& more, std::vector<DesignIssue>& issues) {
+  std::ranges::move(more, std::back_inserter(issues));
+}
+
+std::vector<DesignIssue> least_squares_issues(const DesignSpec& spec, const std::string& path) {
+  std::vector<DesignIssue> issues;
+  const OptimizerSpec& optimizer = spec.optimizer;
+  if (spec.over == "max")
+    issues.push_back({path + ".type", "is 'least_squares', which minimises sums over the cases, not their maximum"});
+  for (const auto& [key, given] :
+       {std::pair("hessian", optimizer.hessian != "lbfgs"),
+        std::pair("lbfgs_history", optimizer.lbfgs_history.has_value()), std::pair("warm_start", optimizer.warm_start)})
+    if (given) issues.push_back({path + "." + key, "is of other optimisers; 'least_squares' has none"});
+  return issues;
+}
+
+std::vector<DesignIssue> history_issues(const OptimizerSpec& optimizer, const NloptMethod* method,
+                                        const std::string& path) {
+  constexpr long kMostPairs = 1000;  // a run of a design takes fewer iterations
+  std::vector<DesignIssue> issues;
+  if (method && !keeps_pairs(*method))
+    issues.push_back({path, "is given, but '" + optimizer.type + "' keeps no pairs; ipopt, lbfgs and mlsl do"});
+  if (!method && optimizer.hessian != "lbfgs")
+    issues.push_back({path, "is given, but hessian is '" + optimizer.hessian + "', which keeps no pairs"});
+  if (*optimizer.lbfgs_history > kMostPairs)
+    issues.push_back({path, "is " + std::to_string(*optimizer.lbfgs_history) + ", at most " +
+                                std::to_string(kMostPairs) + " is allowed"});
+  return issues;
+}
+
+std::vector<DesignIssue> branch_issues(const Scene& scene) {
+  std::vector<DesignIssue> issues;
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) {
+    const Joint& joint = scene.joints[i];
+    if (joint.type == "rack_pinion" || joint.type == "screw" || (joint.type == "gear" && !joint.ratio.is_number()))
+      issues.push_back({child_path("joints", i), "is a " + joint.type +
+                                                     ", which begins at the poses in the file; other assembly modes "
+                                                     "have others, so that design.multistart.branches must be "
+                                                     "\"guess\""});
+  }
+  return issues;
+}
+
+}  // namespace
+
 std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& scene) {
   const OptimizerSpec& optimizer = spec.optimizer;
   const std::string path = "design.optimizer";
   std::vector<DesignIssue> issues;
   const NloptMethod* const method = find_nlopt_method(optimizer.type);
-  if (optimizer.type == OptimizerSpec::kLeastSquares) {
-    if (spec.over == "max")
-      issues.push_back({path + ".type", "is 'least_squares', which minimises sums over the cases, not their maximum"});
-    for (const auto& [key, given] : {std::pair("hessian", optimizer.hessian != "lbfgs"),
-                                     std::pair("lbfgs_history", optimizer.lbfgs_history.has_value()),
-                                     std::pair("warm_start", optimizer.warm_start)})
-      if (given) issues.push_back({path + "." + key, "is of other optimisers; 'least_squares' has none"});
-  }
+  if (optimizer.type == OptimizerSpec::kLeastSquares) append(least_squares_issues(spec, path), issues);
   if (method && optimizer.hessian != "lbfgs")
     issues.push_back({path + ".hessian", "is of ipopt only; '" + optimizer.type + "' builds its own, if any"});
   if (!method && optimizer.hessian != "lbfgs" && is_cvodes(scene.simulation.integrator.type))
     issues.push_back({path + ".hessian", "is '" + optimizer.hessian +
                                              "', which needs a run on given steps; simulation.integrator.type is '" +
                                              scene.simulation.integrator.type + "', which cannot take them: 'lbfgs'"});
-  if (optimizer.lbfgs_history) {
-    constexpr long kMostPairs = 1000;  // a run of a design takes fewer iterations
-    const std::string history = path + ".lbfgs_history";
-    if (method && !keeps_pairs(*method))
-      issues.push_back({history, "is given, but '" + optimizer.type + "' keeps no pairs; ipopt, lbfgs and mlsl do"});
-    if (!method && optimizer.hessian != "lbfgs")
-      issues.push_back({history, "is given, but hessian is '" + optimizer.hessian + "', which keeps no pairs"});
-    if (*optimizer.lbfgs_history > kMostPairs)
-      issues.push_back({history, "is " + std::to_string(*optimizer.lbfgs_history) + ", at most " +
-                                     std::to_string(kMostPairs) + " is allowed"});
-  }
+  if (optimizer.lbfgs_history) append(history_issues(optimizer, method, path + ".lbfgs_history"), issues);
   if (method && optimizer.warm_start)
     issues.push_back({path + ".warm_start", "is of ipopt only, whose barrier leads away from the start; '" +
                                                 optimizer.type + "' has none and begins at the given values"});
@@ -66,26 +97,13 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
                            std::any_of(spec.subject_to.begin(), spec.subject_to.end(), is_equality)};
     if (const std::string refusal = nlopt_refusal(*method, needs); !refusal.empty())
       issues.push_back({path + ".type", refusal});
-    if (method->global) {
-      for (DesignIssue& issue :
-           missing_bounds(spec.variables, scene, path + ".type '" + optimizer.type + "' searches between them"))
-        issues.push_back(std::move(issue));
-    }
+    if (method->global)
+      append(missing_bounds(spec.variables, scene, path + ".type '" + optimizer.type + "' searches between them"),
+             issues);
   }
-  if (spec.multistart && spec.multistart->all_branches) {
-    for (std::size_t i = 0; i < scene.joints.size(); ++i) {
-      const Joint& joint = scene.joints[i];
-      if (joint.type == "rack_pinion" || joint.type == "screw" || (joint.type == "gear" && !joint.ratio.is_number()))
-        issues.push_back({child_path("joints", i), "is a " + joint.type +
-                                                       ", which begins at the poses in the file; other assembly modes "
-                                                       "have others, so that design.multistart.branches must be "
-                                                       "\"guess\""});
-    }
-  }
-  if (spec.multistart) {
-    for (DesignIssue& issue : missing_bounds(spec.variables, scene, "design.multistart draws starts between them"))
-      issues.push_back(std::move(issue));
-  }
+  if (spec.multistart && spec.multistart->all_branches) append(branch_issues(scene), issues);
+  if (spec.multistart)
+    append(missing_bounds(spec.variables, scene, "design.multistart draws starts between them"), issues);
   return issues;
 }
 
