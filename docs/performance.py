@@ -177,8 +177,8 @@ def right_hand_side_section():
 
 
 def parts_section():
-    lines = ["## Where a right-hand side goes", "",
-             "The figures are nanoseconds per body. Each part is measured by itself, so their sum differs from the whole. The *linear",
+    lines = ["## Parts of a right-hand side", "",
+             "The figures are nanoseconds per body. Each part is measured alone, so their sum differs from the whole. The *linear",
              "share* of the sum is assembly of S, its factorisation and the solution with its refinements.", ""] + command("right_hand_side_parts")
     columns = ("frames", "phi_ddot", "jacobian", "assembly", "factor", "solve", "whole")
     cells = []
