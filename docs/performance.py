@@ -116,7 +116,7 @@ def largest(table, pattern, column):
 
 
 def targets():
-    """What issue, aim and measured figure are: (what, aim as text, aim, measured, unit)."""
+    """The rows of the aims: (what, aim as text, aim, measured, unit)."""
     sizes = r"^right_hand_side/(planar_chain|spatial_chain|four_bars)/(10|40|50|200|333|1000)/"
     mega = lambda table, name, column: of(table, name, column)
     rows = [("right-hand side per body, spatial, chains and N-four-bars of 10 to 1000: the slowest", "0.7 us", 0.7,
@@ -177,8 +177,8 @@ def right_hand_side_section():
 
 
 def parts_section():
-    lines = ["## Where a right-hand side goes", "",
-             "The figures are nanoseconds per body. Each part is measured by itself, so their sum differs from the whole. The *linear",
+    lines = ["## Parts of a right-hand side", "",
+             "The figures are nanoseconds per body. Each part is measured alone, so their sum differs from the whole. The *linear",
              "share* of the sum is assembly of S, its factorisation and the solution with its refinements.", ""] + command("right_hand_side_parts")
     columns = ("frames", "phi_ddot", "jacobian", "assembly", "factor", "solve", "whole")
     cells = []
@@ -191,7 +191,7 @@ def parts_section():
     for r in rows_of("primitive"):
         _, primitive, part = r["name"].split("/")
         cells.setdefault(primitive, {})[part] = r["ns"]
-    lines += ["Primitives between two bodies [ns]; `pull_back` is what an adjoint needs of them:", ""] + command("primitive")
+    lines += ["Primitives between two bodies [ns]; the adjoint needs `pull_back`:", ""] + command("primitive")
     return lines + table_of(["primitive", "residual", "jacobian", "pull_back"],
                             [[p, c["residual"], c["jacobian"], c["pull_back"]] for p, c in cells.items()])
 
@@ -229,10 +229,10 @@ def sizes_section():
 def time_to_error_section():
     lines = ["## Time to an error", "",
              "The runs are 10 s of motion. The error is the largest distance of any rod's centre of mass from its right position, at",
-             "201 times. The right position is that of the exact motion (A02 passes its singular position about ten times), and for",
-             "Bricard's mechanism that of `dopri853` at rtol 1e-12. The table shows the fastest of `dopri5`, `verner6` and `dopri853`",
-             "at two tolerances per decade. It must meet the error at a third of the tolerance, too. The time is that of the whole",
-             "`simulate`, initial assembly included.", ""] + command("time_to_error")
+             "201 times. The right motion is the exact one (A02 passes its singular position about ten times), for Bricard's",
+             "mechanism that of `dopri853` at rtol 1e-12. The table shows the fastest of `dopri5`, `verner6` and `dopri853`",
+             "at two tolerances per decade. It must meet the error at a third of the tolerance, too. The time is that of the",
+             "complete `simulate`, including the initial assembly.", ""] + command("time_to_error")
     cells = []
     for r in rows_of("time_to_error"):
         f = lambda c, d=3: figure(number(r.get(c)), d)
@@ -243,9 +243,9 @@ def time_to_error_section():
 
 def gradients_section():
     lines = ["## Gradients", "",
-             "There are 50 parameters. The figures are ratios of wall times to one simulation with its compilation and assembly,",
-             "medians of rounds in turn. *Start* is the share of compilation and assembly in one simulation. *TLM of 1, of 50* is with",
-             "the first parameter alone, and with all. *Per further parameter* is their difference over 49.", ""] + command("gradient_scaling")
+             "There are 50 parameters. The figures are wall times divided by that of one simulation with its compilation and assembly,",
+             "medians of rounds in turn. *Start* is the share of compilation and assembly in one simulation. *TLM of 1* is with the",
+             "first parameter, *TLM of 50* with all. *Per further parameter* is their difference divided by 49.", ""] + command("gradient_scaling")
     cells = []
     for r in rows_of("gradient_scaling"):
         kind, method = r["name"].split("/")[1].split("_")
@@ -254,8 +254,8 @@ def gradients_section():
     lines += table_of(["mechanism", "bodies", "method", "steps", "start", "adjoint", "TLM of 1", "TLM of 50", "TLM per further parameter"], cells)
     lines += ["A full Hessian in ten parameters (FB-1): " + figure(of("hessian", "hessian/five_bar", "hessian_ratio")) + " simulations, by " +
               figure(of("hessian", "hessian/five_bar", "gradients")) + " gradients.", ""] + command("hessian")
-    lines += ["The memory of an adjoint over 10 s is in MiB. *Grown* is the largest growth of the process during the run, assembly",
-              "and its derivatives included.", ""] + command("adjoint_memory")
+    lines += ["The memory of an adjoint over 10 s is in MiB. *Grown* is the largest growth of the process during the run, including",
+              "assembly and its derivatives.", ""] + command("adjoint_memory")
     cells = [[r["bodies"], r["budget_mib"], figure(number(r["kept_mib"])), figure(number(r["grown_mib"])), figure(number(r["recomputed"]), 2)]
              for r in rows_of("adjoint_memory") if r["name"].startswith("adjoint_memory/four_bars")]
     lines += table_of(["bodies", "budget", "kept", "grown", "steps computed again, of all"], cells)
@@ -267,24 +267,24 @@ def gradients_section():
     return lines
 
 
-# By hand: what stands behind aims, missed ones above all. Ratios and counts, which do not age with the machine.
-REASONS = """## What stands behind the figures
+# By hand: the reasons of the figures, above all of missed aims. Ratios and counts do not depend on the machine.
+REASONS = """## Reasons for the figures
 
 `perf record -e cpu-clock` profiles right-hand sides in the spatial model, N-four-bar, N = 40. The shares in per cent
 are: assembly of S 19, its factorisation 15, both solves with their products with J 28, J 14, Phiddot 9, frames with
-pddot 8, the rest 7. In a run with `dopri5` the right-hand sides take about three quarters. The rest is the projection,
-one to two right-hand sides per step, and the sums of the stages.
+pddot 8, the rest 7. In a run with `dopri5` the right-hand sides take about three quarters of the time. The projection
+takes one to two right-hand sides per step, and the sums of the stages the rest.
 
-* **Absolute times vary by a factor of two** on a shared machine, even if it runs nothing else of ours. The same
-  program took 0.42 to 0.58 us (spatial, 10 to 1000 bodies) in one quarter of an hour, 0.5 to 1.1 us in others, and 44
-  to 63 ms (FB-1). On the machine of this page it took 0.33 to 0.42 us in most minutes, 0.45 to 0.56 us in the worst.
-* **Growth to 10 000 bodies is memory.** A body has some 3.4 kB of frames, J, S and constraints, which a right-hand
-  side reads several times. Those of 100 bodies stay in the second-level cache. Those of 10 000 come from the third or,
-  if others use it, from memory. So the loops over bodies and over groups of rows prefetch the data of the fourth one
-  ahead (`core/linear/prefetch.hpp`). The processor's own prefetching ends with each page of 4 kB. Prefetching makes no
-  difference up to 1000 bodies, nor in tangents, which compute more with the data they load.
+* **Absolute times vary by a factor of two** on a shared machine. One program takes 0.42 to 0.58 us (spatial, 10 to 1000
+  bodies) in some quarters of an hour, 0.5 to 1.1 us in others, and 44 to 63 ms (FB-1). On the machine of this page it
+  takes 0.33 to 0.42 us in most minutes, 0.45 to 0.56 us in the worst.
+* **Growth to 10 000 bodies is memory.** A body has about 3.4 kB of frames, J, S and constraints, which a right-hand
+  side reads several times. The data of 100 bodies stay in the second-level cache. Those of 10 000 come from the third
+  or, if others use it, from memory. So the loops over bodies and over groups of rows prefetch the data of the fourth
+  next one (`core/linear/prefetch.hpp`). The processor's own prefetching ends with each page of 4 kB. Prefetching gains
+  nothing up to 1000 bodies, nor in tangents, which compute more with the data that they load.
 
-  | ratio, in space, in turn, in quiet minutes (second-level cache of 1 MB) | without prefetching | with it |
+  | time per body at 10 000 bodies over that at 100, in space (second-level cache of 1 MB) | without prefetching | with it |
   | --- | --- | --- |
   | planar chain | 1.26 to 1.36 | 1.20 to 1.23 |
   | spatial chain | 1.26 to 1.30 | 1.17 to 1.18 |
@@ -292,30 +292,28 @@ one to two right-hand sides per step, and the sums of the stages.
   | tree | 2.0 | 1.5 |
   | while other programs use the third-level cache | up to 1.9 | up to 1.4 |
 
-  The order of four-bars (all cranks, then all couplers) and of trees jumps between bodies, which costs the rest. Three
-  alternatives do not help. Portions of 16 to 512 bodies, each placed, assembled, factored and substituted together,
-  give 1.4 to 2.4 instead of 1.3, since a portion starts a dozen short streams again. Large pages change nothing.
+  In four-bars (all cranks, then all couplers) and in trees neighbours are far apart in memory, which costs the rest.
+  Three alternatives do not help. Portions of 16 to 512 bodies, each placed, assembled, factored and substituted
+  together, give 1.4 to 2.4 instead of 1.3, since each portion starts a dozen short streams. Large pages change nothing.
   Blocks of S set at their first use, and frames computed just before constraints read them, are 3 to 8 per cent slower
-  at 10 to 100 bodies. Chains of more than 316 joints in space take three passes of the solver. Stairs in a plane need
-  two.
-* **TLM**: the directions of 50 parameters of 500 bodies take 23 MB with their stages. They do not fit the second-level
-  cache, so that a parameter costs a quarter more than with 81 bodies. The following figures spread everything that TLM
-  costs beyond a simulation over 49 parameters, with the matrices of the stages and the first parameter. N-four-bars of
-  5, 21, 81, 501 bodies have 0.20, 0.23, 0.27, 0.34 per parameter, chains 0.28, 0.31, 0.30, 0.38. One array for the
-  stage's directions of all blocks instead of one each, and exchanged instead of copied states, gain 1 to 3 per cent.
-  Prefetching of blocks gains nothing. Eight directions at a time would halve the loads of each, and double the cost of
-  problems with up to four parameters.
+  at 10 to 100 bodies. Chains of more than 316 joints in space take three passes of the solver. Planar chains need two.
+* **TLM.** The directions of 50 parameters of 500 bodies take 23 MB with their stages. They do not fit the second-level
+  cache, so a parameter costs a quarter more than with 81 bodies. The complete cost of TLM beyond a simulation, divided
+  by 49 parameters, is 0.20, 0.23, 0.27, 0.34 for N-four-bars of 5, 21, 81, 501 bodies. For chains it is 0.28, 0.31,
+  0.30, 0.38. It includes the matrices of the stages and the first parameter. Common arrays for the stage's directions
+  of all blocks, and exchanged instead of copied states, gain 1 to 3 per cent. Prefetching of blocks gains nothing.
+  Eight directions at a time would halve the loads of each, and double the cost of problems with up to four parameters.
 * **The adjoint** of 1260 steps of 500 rods keeps 0.7 GB. With a budget of 256 MiB it computes every step again.
 * **FB-1** takes nine evaluations with gradients at the tolerance of its file, 1e-9 with `dopri853`. It takes 41 to 44
-  ms on an idle machine, up to 70 beside other programs. The linear solver of Ipopt uses a twentieth to compare names.
-  Finding singular positions takes 6 to 7 % of each simulation.
-* **Hardening** of the release: `-fstack-protector-strong` and `-D_FORTIFY_SOURCE=2` in the sources of the hot loops cost
-  0.3 to 0.5 % more instructions (callgrind: a design, a simulation, a gradient). `-D_GLIBCXX_ASSERTIONS` in the same
-  sources costs 11 to 12 % more, so only `optim/` and `app/` are compiled with it.
-* **Set-up**: a table holds the names of bodies and joints. Rank and redundant equations come from an elimination of one
-  body after another (`core/linear/row_dependence.hpp`). It decides about the rank inside small fronts, and finds the
-  same rows as Gram-Schmidt on whole rows. Initial assembly is dense if the guess is not exact. Its time then grows with
-  the cube of the number of bodies. So give large mechanisms a guess that satisfies the joints to rounding.
+  ms on an idle machine, up to 70 beside other programs. The linear solver of Ipopt needs a twentieth of this for the
+  comparison of names. The search for singular positions takes 6 to 7 % of each simulation.
+* **Hardening.** The release compiles its hot loops with `-fstack-protector-strong` and `-D_FORTIFY_SOURCE=2`. These
+  cost 0.3 to 0.5 % more instructions (callgrind: a design, a simulation, a gradient). `-D_GLIBCXX_ASSERTIONS` in the
+  same sources costs 11 to 12 % more, so only `optim/` and `app/` are compiled with it.
+* **Set-up.** A table holds the names of bodies and joints. An elimination of one body after another finds rank and
+  redundant equations (`core/linear/row_dependence.hpp`). It decides the rank inside small fronts, and finds the same
+  rows as Gram-Schmidt on whole rows. Initial assembly is dense if the guess is not exact. Its time then grows with the
+  cube of the number of bodies. So give large mechanisms a guess that satisfies the joints to rounding.
 """
 
 PEERS = {"simbody": "Simbody", "mujoco": "MuJoCo", "dart": "DART"}
@@ -328,10 +326,10 @@ def peers_section():
         return lines + ["Not measured: `./dev bench --peers` installs Simbody, MuJoCo and DART (Debian packages, for nothing but this) and measures them.", ""]
     lines += ["The programs are Debian's Simbody 3.7, MuJoCo 2.2 and DART 6.12. They evaluate the same mechanisms at the same state, in",
               "turn in one run, in one thread. The figures are microseconds per right-hand side, and in brackets the ratio to mbsopt",
-              "(above 1: mbsopt is faster). mbsopt solves for 6 unknowns per body and all reactions. Simbody, MuJoCo and DART work in",
-              "joint coordinates. Accelerations agree to the figure in *apart* (MuJoCo closes loops by regularised constraints). DART",
-              "closes loops only in its time stepping, so only open mechanisms are compared. MuJoCo's reader does not take chains of",
-              "100 bodies and more.", ""] + command("peers_right_hand_side")
+              "(above 1: mbsopt is faster). mbsopt solves for 6 unknowns per body and all reactions. Simbody, MuJoCo and DART use joint",
+              "coordinates. Accelerations agree to the figure in *apart* (MuJoCo closes loops by regularised constraints). DART closes",
+              "loops only in its time stepping, so its figures are for open mechanisms only. MuJoCo's reader refuses chains of 100",
+              "bodies and more.", ""] + command("peers_right_hand_side")
     cells = []
     for r in rows:
         line = [r["name"].split("/", 1)[1], r["bodies"], figure(number(r["mbsopt_us"]))]
@@ -342,7 +340,7 @@ def peers_section():
         cells.append(line + [", ".join(worst)])
     lines += table_of(["mechanism", "bodies", "mbsopt"] + list(PEERS.values()) + ["apart"], cells)
     lines += ["The runs are 10 s of motion, with the error as above. Each program has its coarsest setting that meets the wanted error,",
-              "else its most exact one. mbsopt has an error no larger than that.", ""] + command("peers_time_to_error")
+              "else its most exact setting. The error of mbsopt is not larger than this error.", ""] + command("peers_time_to_error")
     cells, words = [], []
     for r in rows_of("peers_time_to_error"):
         name = r["name"].split("/", 1)[1]
@@ -367,9 +365,9 @@ def write():
     loads = [float(r["load"]) for r in runs]
     lines = ["# Performance", "",
              "`./dev bench` writes this page (`docs/performance.py`); do not edit it. The figures are in `data/performance/`, the",
-             "programs in `bench/`. Each table stands below the command that measures it alone. `./dev bench --peers` measures",
-             "all, the other programs included.", "", "Measured on:", "", *[f"* {machine}" for machine in machines], "",
-             "All runs use one thread. Times are processor times of this thread, medians. Ratios are taken in one run, in turn.", ""]
+             "programs in `bench/`. Each table is below the command that measures only this table. `./dev bench --peers` measures",
+             "all tables, including those with other programs.", "", "Measured on:", "", *[f"* {machine}" for machine in machines], "",
+             "All runs use one thread. Times are medians of this thread's processor time. Ratios are from one run, measured in turn.", ""]
     if loads and max(loads) > 0.7 * min(int(r["cores"]) for r in runs):
         lines += [f"**The machine was busy**: its load was {min(loads):.0f} to {max(loads):.0f}. Processor times are longer than on an idle machine, since",
                   "programs share a core's caches and arithmetic. Ratios within a run hardly depend on it.", ""]

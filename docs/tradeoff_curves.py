@@ -107,7 +107,7 @@ def why_it_rises(curves, curve, quantity, i):
         twin = curves[quantity].get(curve.replace("tlm", "adjoint") if curve.startswith("tlm") else curve.replace("adjoint", "tlm"), [])
         k = same_setting(twin, after.row, but_curve=True)
         if k is not None and abs(twin[k].deviation - after.deviation) > 0.3 * after.error:
-            return f"magnified rounding: TLM and adjoint, the same derivative on the same steps, differ by {abs(twin[k].deviation - after.deviation):.1e}"
+            return f"amplified rounding: TLM and adjoint, the same derivative on the same steps, differ by {abs(twin[k].deviation - after.deviation):.1e}"
     if of_gradient and after.work > STARVED * here.work:
         return f"rounding: {after.work / here.work:.0f} times the right-hand sides, in steps that are shortened without effect next to singular positions"
     if changes_sign(points, i):
@@ -122,9 +122,9 @@ def why_it_rises(curves, curve, quantity, i):
         other = others.get(curve, [])
         k = same_setting(other, here.row)
         if name != quantity and not of_gradient and k is not None and changes_sign(other, k):
-            return f"the error of {name} passes through zero there, and with it most of this one"
+            return f"the error of {name} passes through zero there, and with it most of this error"
     if after.work < SAME_WORK * here.work:
-        return "stability, not the tolerance, sets the steps: they are the same but for a few"
+        return "stability, not the tolerance, limits the steps: almost all are the same"
     if i > 0 and after.error < (points[i - 1].error * here.error) ** 0.5:
         return "the first is below the line through its neighbours, by chance"
     if after.error < 1.5 * here.error:
@@ -176,7 +176,7 @@ def monotony(rows, apart, absolute):
                       f"bound falls or stays in {counted(falls, steps)} pairs, and right-hand sides grow in {counted(grows, steps)}. The bound is at most "
                       f"three times the error in {counted(close, points)} points.")
     if dominated:
-        lines += [""] + paragraph("These settings stand beside their lines, since a tighter one needed no more right-hand sides: " + "; ".join(
+        lines += [""] + paragraph("These settings are beside their lines, since a tighter one needs no more right-hand sides: " + "; ".join(
             f"`{curve}` at {', '.join(of)} ({', '.join(map(str, of.values()))}; {work} at {setting})" for (curve, setting, work), of in dominated.items()) + ".")
     if settings > points:
         lines += [""] + paragraph(f"Points on no line, since their bounds are 1 or more: {settings - points}.")

@@ -138,9 +138,9 @@ def gallery_section():
     rows = rows_of(DATA / "gallery.csv")
     lines = ["### The gallery at default settings", ""]
     lines += paragraph("A file without `integrator` and `formulation` runs with the augmented Lagrangian, `dopri853`, rtol 1e-8, atol 1e-10 and steps of "
-                       "at most 1/150 of the run. The columns are the largest error of its objectives and of their gradients, relative unless said. Files "
-                       "that identify have a second row: the sum of squares and its gradient at the initial values. Wanted are 1e-5 and 1e-4; **bold** "
-                       "figures miss them. Own is the setting of the file. Apart is the difference between the two methods of the reference.") + [""]
+                       "at most 1/150 of the run. The columns are the largest error of its objectives and of their gradients, relative unless stated. Files "
+                       "that identify have a second row: the sum of squares and its gradient at the initial values. The aims are 1e-5 and 1e-4; "
+                       "**bold** figures miss them. *Own setting* is that of the file. *Apart* is the difference between the two methods of the reference.") + [""]
     cells, missed = [], []
     for r in rows:
         absolute = " (absolute)" if r["absolute"] else ""
@@ -154,7 +154,7 @@ def gallery_section():
     known = [r for r in rows if r["defaults_objective"]]
     good = {k: sum(1 for r in known if r["defaults_" + k] and float(r["defaults_" + k]) <= w) for k, w in WANTED.items()}
     of = {k: sum(1 for r in known if r["defaults_" + k]) for k in WANTED}
-    lines += [f"{good['objective']} of {of['objective']} objectives and {good['gradient']} of {of['gradient']} gradients are as exact as wanted.", ""]
+    lines += [f"{good['objective']} of {of['objective']} objectives and {good['gradient']} of {of['gradient']} gradients meet their aims.", ""]
     return lines
 
 
@@ -164,7 +164,7 @@ def sweep_section(run):
     apart, advice = json.loads(run["apart"]), json.loads(run["advice"])
     absolute = json.loads(run.get("absolute") or "[]")
     lines = [f"### `{problem}`", "", f"    {run['command']}", ""]
-    lines += paragraph(f"The reference is {run['first']}, certified by {run['second']}. They are apart by " +
+    lines += paragraph(f"The reference is {run['first']}, certified by {run['second']}. The two differ by " +
                        ", ".join(f"{v:.0e} ({q})" for q, v in apart.items()) + ".") + [""]
     lines += monotony(rows, apart, absolute)
     objective = next((q for q in apart if q not in ("motion", "sensors") and not q.startswith("gradient of ")), "motion")
