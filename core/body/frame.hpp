@@ -1,6 +1,6 @@
 // A frame is a body as constraints, forces and sensors see it. It has the centre of mass r, the matrix A of the axes,
-// and their first and second time derivatives. Every primitive is a polynomial in these. So its derivatives in (q, v)
-// take two steps. The first leads to the frame. The second leads from the frame to (r, p) and (rdot, pdot) by the
+// and their first and second time derivatives. Every primitive is a smooth function of these. So its derivatives in (q,
+// v) take two steps. The first leads to the frame. The second leads from the frame to (r, p) and (rdot, pdot) by the
 // pull-backs below, once per body.
 //
 //   A = A(p)     Adot = B(p, pdot)     Addot = B(p, pddot) + 2 A(pdot)
@@ -29,7 +29,7 @@ struct Frame {
   Vector3d point_eta(const Vector3d& s) const { return r_eta + A_eta * s; }
 };
 
-// Gradient of a scalar with respect to the entries of a Frame.
+// Gradient of a scalar with respect to the entries of a Frame. rddot, r_eta and theta_eta are held fixed.
 struct FrameBar {
   Vector3d r, rdot;
   Matrix3d A, Adot, Addot, A_eta;
@@ -69,7 +69,7 @@ void set_virtual(const Vec<6>& eta, Frame& frame);
 // a = qddot from z: (rddot, pddot).
 Vec<7> acceleration(const BodyState& body, const Frame& frame);
 
-// T(p)' w: a cotangent of (rddot, pddot) seen by z = (rddot, omegadot).
+// T'w with T = da/dz: the cotangent of z = (rddot, omegadot) for w, that of a = (rddot, pddot).
 Vec<6> to_virtual(const BodyState& body, const Vec<7>& w);
 
 // Moves the cotangents of A_eta and p_eta, the images of the virtual displacement, to A and p; eta_theta is held fixed.

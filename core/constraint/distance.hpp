@@ -1,6 +1,6 @@
 // Distance of two body points.   [m]
 //   Phi      = l = |d|,   d = P2 - P1,  u = d/l
-//   Phidot   = u'ddot,    Phiddot = u'dddot + (|ddot|^2 - ldot^2)/l
+//   Phidot   = u'(d)dot,    Phiddot = u'(d)ddot + (|(d)dot|^2 - Phidot^2)/l
 //   Phi_eta  = [ -u'  -(s1 x A1'u)'    u'  (s2 x A2'u)' ]
 // Phi is l and not d'd, so its multiplier is the force in the rod [N] and a violation is a length. At l = 0 there is no
 // direction, and u = 0.

@@ -1,7 +1,7 @@
 // Dot-2: the component along a vector of body 1 of the separation of two points.   [m]
-//   Phi      = x'd,   x = A1 s3,  d = P2 - P1 = r2 + A2 s2 - r1 - A1 s1
-//   Phidot   = xdot'd + x'ddot,     Phiddot = xddot'd + 2 xdot'ddot + x'dddot
-//   Phi_eta  = [ -x'  (s3 x A1'd - s1 x A1'x)'    x'  (s2 x A2'x)' ]
+//   Phi      = w'd,   w = A1 s3,  d = P2 - P1 = r2 + A2 s2 - r1 - A1 s1
+//   Phidot   = (w)dot'd + w'(d)dot,   Phiddot = (w)ddot'd + 2 (w)dot'(d)dot + w'(d)ddot
+//   Phi_eta  = [ -w'  (s3 x A1'd - s1 x A1'w)'    w'  (s2 x A2'w)' ]
 // With s3 across a joint's axis, Phi = 0 lets the point slide along the axis. With s3 along the axis, Phi is the
 // joint's displacement. Haug (1989), section 9.4 (dot-2).
 #pragma once

@@ -7,10 +7,11 @@
 //   jacobian                 J1, J2 (rows x 6): Phi_eta of each body
 //   pull_back                gradient of  lambda'(J1 eta1 + J2 eta2) + mu0'Phi + mu1'Phidot + mu2'Phiddot
 //                            in the frames (eta held fixed) and in s1, s2, s3: all that the adjoint sweep needs
-//   tangent                  the same information forward: Phi', Phidot', Phiddot' and (J' lambda)' in kLanes
-//                            directions
+//   tangent                  the same information forward: Phi, Phidot, Phiddot and J'lambda, differentiated in
+//                            kLanes directions
 //
 // A mechanism in a plane uses core/dynamics/planar_constraints.hpp instead: the same equations in complex numbers.
+// docs/architecture.md follows a dot2 from here to the gradient.
 #pragma once
 
 #include <concepts>

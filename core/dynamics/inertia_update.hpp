@@ -2,7 +2,7 @@
 // each,
 //
 //   [M + E Mu E'  J'] (z, lambda) = (b, g)       (z, lambda) = (z0, lambda0) - (Z, Lambda) Mu w,   (I + A Mu) w = E'z0
-//   [J            -c]
+//   [J            -1/alpha]
 //
 // (z0, lambda0): the solution without Mu. (Z, Lambda): those of the columns of E. A = E'Z. (Sherman, Morrison,
 // Woodbury.) It does and allocates nothing if users add no mass.

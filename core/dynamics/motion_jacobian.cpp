@@ -21,7 +21,7 @@ MotionJacobian::MotionJacobian(const MechanismData& data) : n_(data.n), m_(data.
 MotionJacobian::Values MotionJacobian::values() const {
   Values x;
   x.q.assign(pairs_.size(), Block::Zero()), x.v = x.q;
-  x.row_q.assign(rows_.size(), Row::Zero()), x.row_v = x.row_q, x.J_T = x.row_q;
+  x.row_q.assign(rows_.size(), Row::Zero()), x.row_v = x.row_q, x.J_Z = x.row_q;
   x.J.assign(rows_.size(), Mat<1, 6>::Zero());
   x.mass.assign(at(n_), Block::Zero());
   return x;
@@ -38,7 +38,7 @@ void MotionJacobian::evaluate(StageEquations& equations, Values& out) {
     const int body = rows_[k].body;
     out.J[k].setZero();
     for (const int block : blocks_of_[k]) out.J[k] += block >= 0 ? J.J1.row(block) : J.J2.row(-1 - block);
-    out.J_T[k] = equations.times_T(body + 1, out.J[k]);
+    out.J_Z[k] = equations.times_Z(body + 1, out.J[k]);
     out.row_q[k] = -blocks.c[k].q;
     out.row_q[k].tail<4>() += out.J[k].tail<3>() * omegadot_p_[at(body)];
     out.row_v[k] = -blocks.c[k].v;

@@ -25,7 +25,7 @@ class MotionJacobian {
     std::vector<Block> q, v;        // per pair of bodies
     std::vector<Row> row_q, row_v;  // per row and body
     std::vector<Block> mass;        // per body
-    std::vector<Row> J_T;           // per row and body
+    std::vector<Row> J_Z;           // per row and body
     std::vector<Mat<1, 6>> J;       // the same
     double compliance = 0;          // of every row
   };

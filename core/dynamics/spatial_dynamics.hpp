@@ -3,8 +3,10 @@
 // Unknowns per body: z = (rddot, omegadot), omegadot in body axes. a = qddot = (rddot, pddot) follows from z
 // (frame.hpp).
 //
-//   tangent:  [M J'; J -c] (z', lambda') = (b', c')                     b, c: motion_terms.hpp
-//   adjoint:  [M J'; J -c] (eta, mu) = (T'w, 0),  then  y_bar += d/dy [ w'a + eta'b + mu'c ]
+//   tangent:  [M J'; J -1/alpha] (z', lambda') = (b', c')                 b, c: motion_terms.hpp
+//   adjoint:  [M J'; J -1/alpha] (eta, mu) = (T'w, 0),  then  y_bar += d/dy [ w'a + eta'b + mu'c ]
+//
+// 1/alpha is 0 if the equations are constrained. T = da/dz.
 //
 // The adjoint is matrix-free. Tangents multiply with blocks that are evaluated once per state (motion_blocks.hpp).
 //

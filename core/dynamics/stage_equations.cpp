@@ -123,7 +123,7 @@ void StageEquations::add_fixed_a(int body, Mat<7, 7>& q, Mat<7, 7>& v) const {
   v.block<1, 4>(6, 3) = 2 * p.squaredNorm() * pdot.transpose();
 }
 
-Mat<1, 7> StageEquations::times_T(int body, const Mat<1, 6>& J_row) const {
+Mat<1, 7> StageEquations::times_Z(int body, const Mat<1, 6>& J_row) const {
   const Vector4d& p = terms_.bodies[at(body)].p;
   Mat<1, 7> x;
   x.head<3>() = J_row.head<3>();

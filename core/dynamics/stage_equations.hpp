@@ -34,10 +34,10 @@ class StageEquations {
   void add_adjoint(const Eigen::VectorXd& r_bar, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar);
 
-  // Pieces of -r_(a, lambda) = [M T, J'; J T, -1/alpha] with T = dz/da: a body's own block with its row of p, and a row
-  // of J times T. 1/alpha is 0 if constrained.
+  // Pieces of -r_(a, lambda) = [M Z, J'; J Z, -1/alpha] with Z = dz/da: a body's own block with its row of p, and a row
+  // of J times Z. 1/alpha is 0 if constrained.
   Mat<7, 7> mass_block(int body) const;
-  Mat<1, 7> times_T(int body, const Mat<1, 6>& J_row) const;
+  Mat<1, 7> times_Z(int body, const Mat<1, 6>& J_row) const;
   double compliance() const { return dynamics_.compliance(); }
   const ConstraintRows& rows() const { return dynamics_.solver().rows(); }
   // The derivatives of b and c with z fixed. A fixed a adds terms of omegadot_by_p; add_fixed_a adds them to a body's

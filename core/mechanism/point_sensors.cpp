@@ -39,6 +39,17 @@ BodyPoint sensor_point(Compilation& model, const std::string& body, const PointF
   return result;
 }
 
+void add_point(const MechanismData& d, const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar,
+               const Vector3d& V_bar, double scale, VecOut y_bar, VecOut rho_bar) {
+  FrameBar bar;
+  bar.set_zero();
+  bar.r = X_bar, bar.rdot = V_bar;
+  bar.A = X_bar * point.s.transpose(), bar.Adot = V_bar * point.s.transpose();
+  add_pull_back(body, point.body, bar, scale, y_bar);
+  const Vec<3> s_bar = body.frame.A.transpose() * X_bar + body.frame.Adot.transpose() * V_bar;
+  add_slot<3>(d, point.slot, s_bar, scale, rho_bar);
+}
+
 namespace {
 
 // A position in the ground's axes needs neither velocities nor frames. Most objectives read such positions.
@@ -76,17 +87,6 @@ void add_place_bar(const MechanismData& d, const BodyPoint& point, const Eigen::
   Eigen::Map<Vector3d>{q_bar + 4} += 2 * (b.e.dot(s) * X_bar + e_X * s - along * b.e + b.e0 * s.cross(X_bar));
   const Vec<3> s_bar = (b.e0 * b.e0 - b.e.squaredNorm()) * X_bar + (2 * e_X) * b.e - (2 * b.e0) * b.e.cross(X_bar);
   add_slot<3>(d, point.slot, s_bar, 1, rho_bar);
-}
-
-void add_point(const MechanismData& d, const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar,
-               const Vector3d& V_bar, double scale, VecOut y_bar, VecOut rho_bar) {
-  FrameBar bar;
-  bar.set_zero();
-  bar.r = X_bar, bar.rdot = V_bar;
-  bar.A = X_bar * point.s.transpose(), bar.Adot = V_bar * point.s.transpose();
-  add_pull_back(body, point.body, bar, scale, y_bar);
-  const Vec<3> s_bar = body.frame.A.transpose() * X_bar + body.frame.Adot.transpose() * V_bar;
-  add_slot<3>(d, point.slot, s_bar, scale, rho_bar);
 }
 
 // Kinematic acceleration (without gravity) of a body point, or the plain difference of two.   [m/s^2]

@@ -21,6 +21,10 @@ struct BodyPoint {
 
 BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where);
 
+// Adds scale times the gradients X_bar in the position of a body point and V_bar in its velocity.
+void add_point(const MechanismData& data, const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar,
+               const Vector3d& V_bar, double scale, VecOut y_bar, VecOut rho_bar);
+
 // A body with the acceleration from the equations of motion.
 BodyAt moving(const StatePoint& at, int body);
 

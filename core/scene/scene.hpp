@@ -223,18 +223,18 @@ struct PointOnBody {
 struct Sensor {
   std::string name;
   std::string quantity;  // position velocity angle rate energy constraint_violation distance ...
-  std::string body;      // of position, velocity, angular_velocity, orientation
+  std::string body;      // kQuantities (type_table.cpp) lists the fields of each quantity
   PointField point = "O";
   std::optional<PointOnBody> relative_to;
   std::string component;       // x y z norm | kinetic potential total | e0..e3
   bool in_body_frame = false;  // "frame": "body"
-  std::string joint;           // of angle, rate, displacement
-  std::string body1, body2;    // of distance, distance_rate
+  std::string joint;
+  std::string body1, body2;
   PointField point1 = "O", point2 = "O";
   std::string force;               // of force
   std::string kind;                // of reaction: force or torque
   std::string drive;               // of drive_force
-  std::optional<PointField> axis;  // of body_angle, in the ground
+  std::optional<PointField> axis;  // in the ground, or in body1
   Expression value;                // of expression: of t, parameters, definitions and other sensors
   OrientationField axes;           // of imu: of its axes in those of the body
 };

@@ -165,7 +165,7 @@ void StageMatrix::add_joint(const Joint& joint, int i, const MotionJacobian::Val
   const std::size_t bodies = joint.bodies.size(), rows = at(joint.rows), places = rows * bodies;
   const MotionJacobian::Row* const row_v = x.row_v.data() + joint.place;
   const MotionJacobian::Row* const row_q = x.row_q.data() + joint.place;
-  const MotionJacobian::Row* const J_T = x.J_T.data() + joint.place;
+  const MotionJacobian::Row* const J_Z = x.J_Z.data() + joint.place;
   Vec<6>* const JW = JW_.data();
   MotionJacobian::Row* const G = G_.data();
   for (std::size_t k = 0; k < places; ++k) {
@@ -177,7 +177,7 @@ void StageMatrix::add_joint(const Joint& joint, int i, const MotionJacobian::Val
     if (i != j && p == 0 && pp == 0) continue;
     for (std::size_t k = 0; k < places; ++k) {
       G[k] = p * row_v[k] + pp * row_q[k];
-      if (i == j) G[k] += J_T[k];
+      if (i == j) G[k] += J_Z[k];
       G[k].array() *= column_scale_.transpose().array();
     }
     for (std::size_t a = 0; a < bodies; ++a) {
@@ -211,7 +211,7 @@ bool StageMatrix::factor_sparse() {
       for (std::size_t r = 0; r < of.row_q.size(); ++r) {
         const double scale = multiplier_scale_(jacobian_->rows()[r].row);
         for (Eigen::Index e = 0; e < 7; ++e) {
-          add(scale * column_scale_(e) * (p * of.row_v[r](e) + pp * of.row_q[r](e) + (i == j ? of.J_T[r](e) : 0.0)));
+          add(scale * column_scale_(e) * (p * of.row_v[r](e) + pp * of.row_q[r](e) + (i == j ? of.J_Z[r](e) : 0.0)));
         }
       }
     }
@@ -445,7 +445,7 @@ void StageMatrix::add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
       const auto& r = jacobian_->rows()[k];
       y(stage + accelerations_ + r.row) += sign * (of.row_v[k].dot(v_.segment<7>(combined + columns_of(r.body))) +
                                                    of.row_q[k].dot(q_.segment<7>(combined + columns_of(r.body))) +
-                                                   of.J_T[k].dot(x.segment<7>(stage + columns_of(r.body))));
+                                                   of.J_Z[k].dot(x.segment<7>(stage + columns_of(r.body))));
     }
   }
 }
@@ -461,7 +461,7 @@ void StageMatrix::add_G_transposed(double sign, const Eigen::Ref<const Eigen::Ve
       const double lambda = x(stage + accelerations_ + r.row);
       v_.segment<7>(combined + columns_of(r.body)) += lambda * of.row_v[k].transpose();
       q_.segment<7>(combined + columns_of(r.body)) += lambda * of.row_q[k].transpose();
-      y.segment<7>(stage + columns_of(r.body)) += (sign * lambda) * of.J_T[k].transpose();
+      y.segment<7>(stage + columns_of(r.body)) += (sign * lambda) * of.J_Z[k].transpose();
     }
   }
   spread(sign, y);

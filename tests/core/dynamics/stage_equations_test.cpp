@@ -183,7 +183,7 @@ TEST_CASE("the sparse Jacobian has the residual's derivatives in q, v, a and lam
     const auto& [row, body] = jacobian.rows()[k];
     found.block<1, 7>(n + row, 7 * body) = values.row_q[k];
     found.block<1, 7>(n + row, n + 7 * body) = values.row_v[k];
-    found.block<1, 7>(n + row, 2 * n + 7 * body) = values.J_T[k];
+    found.block<1, 7>(n + row, 2 * n + 7 * body) = values.J_Z[k];
     found.block<6, 1>(7 * body, 3 * n + row) = values.J[k].transpose();
   }
   for (int i = 0; i < n / 7; ++i) found.block<7, 7>(7 * i, 2 * n + 7 * i) = values.mass[static_cast<std::size_t>(i)];

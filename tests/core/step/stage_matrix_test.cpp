@@ -32,7 +32,7 @@ MatrixXd dense(const MotionJacobian& jacobian, const MatrixXd& P,
         const auto [row, body] = jacobian.rows()[k];
         block.block<1, 7>(n + row, 7 * body) += P(i, j) * x.row_v[k] + P2(i, j) * x.row_q[k];
         if (i != j) continue;
-        block.block<1, 7>(n + row, 7 * body) += x.J_T[k];
+        block.block<1, 7>(n + row, 7 * body) += x.J_Z[k];
         block.block<6, 1>(7 * body, n + row) += x.J[k].transpose();
       }
       if (i != j) continue;
@@ -117,7 +117,7 @@ TEST_CASE("where blocks give a wrong answer, the sparse LU does not", "[stage_ma
     if (row == body) x.v[k].diagonal().setConstant(body < 2 ? s : 1.0);
     if (row < 2 && body < 2 && row != body) x.v[k].setIdentity();
   }
-  for (auto* rows : {&x.row_q, &x.row_v, &x.J_T}) {
+  for (auto* rows : {&x.row_q, &x.row_v, &x.J_Z}) {
     for (auto& row : *rows) row.setZero();
   }
   for (auto& row : x.J) row.setZero();
