@@ -27,7 +27,8 @@ void create_folder(const std::filesystem::path& path);
 // Serves commands that write files for a user to edit. Throws OutputError if anything exists at `path`.
 void refuse_to_overwrite(const std::filesystem::path& path, std::string_view command);
 
-// Whether `part` is the name of a temporary part of the file that was never renamed, because its writer was killed.
+// Returns whether `part` is the name of a temporary part of the file that was never renamed, because its writer was
+// killed.
 bool is_part_of(std::string_view part, std::string_view file);
 
 }  // namespace mbsopt

@@ -28,7 +28,7 @@ class Findings {
   // Marks a path whose finding is reported at another place.
   void add_elsewhere(const std::string& path) { mark(path); }
 
-  // Whether a path, one around it, or one inside it has a finding already.
+  // Returns whether a path, one around it, or one inside it has a finding already.
   bool concerns(std::string_view path) const;
   bool any() const { return !found_.empty(); }
   // Makes a finding about a value without collecting it, for warnings.

@@ -277,7 +277,7 @@ void draw_instants(const LinePlot& plot, const PlotFrame& frame, std::string& sv
   }
 }
 
-// Whether 0.02, 5, 1000 is a fit form for all ticks of an axis.
+// Returns whether 0.02, 5, 1000 is a fit form for all ticks of an axis.
 bool near_one(const std::vector<double>& ticks) {
   return std::all_of(ticks.begin(), ticks.end(), [](double tick) { return tick > 0.9e-3 && tick < 1.1e4; });
 }

@@ -42,7 +42,7 @@ std::string coordinate(PageArrays& arrays, const std::vector<double>& values) {
   return fmt::format("[{}]", arrays.add(values));
 }
 
-// Whether the columns of time and poses are finite. A sensor may have no value.
+// Returns whether the columns of time and poses are finite. A sensor may have no value.
 bool poses_are_finite(const MovingState& state) {
   const auto columns = static_cast<std::ptrdiff_t>(1 + 13 * state.scene.bodies.size());
   return std::ranges::all_of(state.trajectory.rows, [&](const std::vector<double>& row) {
@@ -142,7 +142,7 @@ std::string state_json(PageArrays& arrays, const MovingState& state, std::size_t
       reactions_json(arrays, state));
 }
 
-// Whether all points stay in planes of that normal.
+// Returns whether all points stay in planes of that normal.
 bool moves_in(std::array<int, 2> plane, const Scene& scene, const Trajectory& trajectory) {
   constexpr double kStandstill = 1e-6;  // [m] per metre of the largest distance
   const auto normal = static_cast<std::size_t>(3 - plane[0] - plane[1]);

@@ -23,7 +23,7 @@ void add_status(HtmlPage& page, const Json& result);  // a banner where it did n
 void add_model(HtmlPage& page, const Json& result);   // bodies, equations, degrees of freedom
 void add_simulation(HtmlPage& page, const Scene& scene, const Json& result);  // steps, violations, energy
 void add_objectives(HtmlPage& page, const Json& result);                      // name and value
-// Whether any objective is a smooth maximum or minimum, with the true one beside it.
+// Returns whether any objective is a smooth maximum or minimum, with the true one beside it.
 bool has_true_values(const Json& result);
 // Adds objective, infeasibility and parameters over iterations. parameters has the form of result.json, by the names of
 // columns. unit is that of the objective.

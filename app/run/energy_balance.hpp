@@ -5,7 +5,7 @@
 
 namespace mbsopt {
 
-// Whether only gravity and springs with constant coefficients act, so that the total energy is constant.
+// Returns whether only gravity and springs with constant coefficients act, so that the total energy is constant.
 bool conserves_energy(const Scene& scene);
 
 // These words follow a change of energy that is not conserved.

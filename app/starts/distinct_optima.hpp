@@ -20,11 +20,11 @@ namespace mbsopt {
 
 inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: what ranks as feasible
 
-// Whether a start converged with all limits held.
+// Returns whether a start converged with all limits held.
 bool is_an_optimum(const Json& record);
 
-// Whether two optima agree within 1e-3 of the range of each bounded parameter, or of its logarithm if that is the
-// scale.
+// Returns whether two optima agree within 1e-3 of the range of each bounded parameter, or of its logarithm if that is
+// the scale.
 bool same_optimum(const Json& a, const Json& b, const Scene& scene);
 
 struct DistinctOptimum {
@@ -43,7 +43,7 @@ struct SearchedOptima {
 };
 SearchedOptima searched(const std::vector<DistinctOptimum>& optima);
 
-// Whether the rule holds in each searched assembly mode.
+// Returns whether the rule holds in each searched assembly mode.
 bool all_found(const std::vector<Json>& ranked, const Scene& scene);
 
 }  // namespace mbsopt

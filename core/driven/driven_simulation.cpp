@@ -32,8 +32,8 @@ std::string why_integrated(const MechanismData& d, const SimulationSettings& s) 
   return "";
 }
 
-// Whether a gradient in y has a part out of the plane. The part in the plane is rounding: the drives determine the
-// state.
+// Returns whether a gradient in y has a part out of the plane. The part in the plane is rounding: the drives determine
+// the state.
 bool leaves_plane(const MechanismData& d, Eigen::VectorXd y_bar) {
   const PlanarBodies plane(*d.planar);
   const StateLayout layout{d.n};
@@ -46,7 +46,7 @@ bool leaves_plane(const MechanismData& d, Eigen::VectorXd y_bar) {
   return y_bar.any();
 }
 
-// Whether a parameter moves a body, or a point of a joint, out of the plane.
+// Returns whether a parameter moves a body, or a point of a joint, out of the plane.
 bool moves_out_of_plane(const MechanismData& d) {
   const PlanarModel& plane = *d.planar;
   const auto moves = [&](int slot, const auto& normal) {

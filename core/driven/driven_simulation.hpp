@@ -18,12 +18,12 @@ namespace mbsopt {
 
 class Mechanism;
 
-// Whether the run is solved, not integrated: drives exist and leave no freedom at the start, and no setting demands an
-// integration. Such settings are: solve "dynamics", a fixed step, CVODES, soft joints, no projection, a start from
-// equilibrium. Throws std::invalid_argument if solve is "kinematics" and the run cannot be solved.
+// Returns whether the run is solved, not integrated: drives exist and leave no freedom at the start, and no setting
+// demands an integration. Such settings are: solve "dynamics", a fixed step, CVODES, soft joints, no projection, a
+// start from equilibrium. Throws std::invalid_argument if solve is "kinematics" and the run cannot be solved.
 bool is_solved(const Mechanism& mechanism, const SimulationSettings& settings, const Assembly& start);
 
-// Whether the settings and the number of equations allow a solved run, if the mechanism can be assembled.
+// Returns whether the settings and the number of equations allow a solved run, if the mechanism can be assembled.
 bool may_be_solved(const Mechanism& mechanism, const SimulationSettings& settings);
 
 SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSettings& settings,

@@ -15,7 +15,7 @@ bool any_force_but_springs(const MechanismData& d) {
   return d.forces->size() > d.forces->of<TsdaForce>().size() || !d.applied.empty() || !d.user_forces.empty();
 }
 
-// Whether torques about hinges and free torques are the only forces that depend on the state.
+// Returns whether torques about hinges and free torques are the only forces that depend on the state.
 bool nothing_but_torques(const MechanismData& d) {
   return d.forces->size() == d.forces->of<RsdaForce>().size() + d.forces->of<TurningFriction>().size() &&
          d.user_forces.empty() && std::ranges::all_of(d.applied, [](const AppliedForce& f) {

@@ -15,8 +15,8 @@ class PlanarSprings {
  public:
   explicit PlanarSprings(const MechanismData& data);  // data must have a planar model
 
-  // Whether both points of each spring lie at the same height along n. Bodies keep their heights, but states may
-  // differ.
+  // Returns whether both points of each spring lie at the same height along n. Bodies keep their heights, but states
+  // may differ.
   bool lie_in_plane(const Eigen::VectorXd& y) const;
 
   // loads[k - 1] belongs to body k.

@@ -17,9 +17,9 @@ class PlanarTorques {
   using Frames = std::vector<PlanarFrame<double>>;
   explicit PlanarTorques(const MechanismData& data);  // with a planar model
 
-  // Whether the vectors between which the hinges measure their angles lie in the plane.
+  // Returns whether the vectors between which the hinges measure their angles lie in the plane.
   bool lie_in_plane() const { return lie_in_plane_; }
-  // Whether no other force but springs acts, and no parameter turns these vectors.
+  // Returns whether no other force but springs acts, and no parameter turns these vectors.
   bool are_all() const { return are_all_; }
 
   // visitor(torque, law at these frames with its derivatives)

@@ -20,7 +20,7 @@ Dimension operator*(const Dimension& a, const Dimension& b);
 Dimension operator/(const Dimension& a, const Dimension& b);
 Dimension pow(const Dimension& a, int exponent);
 
-// Whether a quantity of one dimension may replace one of the other: the powers are equal except for the angle.
+// Returns whether a quantity of one dimension may replace one of the other: the powers are equal except for the angle.
 bool compatible(const Dimension& a, const Dimension& b);
 
 struct Unit {

@@ -33,7 +33,8 @@ enum class PlainNumbers { fit_everything, are_pure };
 std::optional<Dimension> infer_dimension(const Expression& expression, const DimensionOfName& dimension_of_name,
                                          PlainNumbers plain = PlainNumbers::fit_everything);
 
-// Whether an expression of that dimension may be the value of a field. Unknown and absent dimensions always fit.
+// Returns whether an expression of that dimension may be the value of a field. Unknown and absent dimensions always
+// fit.
 bool fits(const std::optional<Dimension>& found, const Dimension& expected);
 
 }  // namespace mbsopt

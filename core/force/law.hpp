@@ -49,7 +49,7 @@ struct Law {
   void add_field_gradient(double x, double xdot, double f_bar, const Scratch& s, Eigen::VectorXd& theta_bar,
                           Eigen::VectorXd& rho_bar) const;
 
-  // Whether f changes in the block at fixed x, xdot.
+  // Returns whether f changes in the block at fixed x, xdot.
   bool moves(const ParameterBlock& block) const { return program || block.moves(slot, kFields); }
 
   // The tangent of f through the law's own fields (directions of k, c, x0, f0; null if constant). A program adds the

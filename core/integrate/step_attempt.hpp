@@ -38,7 +38,8 @@ class StepAttempt {
   StepOutcome solve(double h, bool adaptive, bool exact, double& error);
   StepOutcome finish(bool dense);  // dense stages, projection, branches of the angles
 
-  // Whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its place.
+  // Returns whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its
+  // place.
   bool better_placed_by(double wanted, double largest);
   void accept();   // the stages of the next step start from this one
   void advance();  // the start has moved to the step's end

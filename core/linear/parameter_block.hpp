@@ -14,7 +14,7 @@ struct ParameterBlock {
   std::vector<int> moved_before;  // per row of theta, and after the last: how many rows before it are not zero
   int parameter[kLanes];          // index of each lane's parameter, -1: lane not used
 
-  // Whether a field of `rows` rows changes in any of the lanes.
+  // Returns whether a field of `rows` rows changes in any of the lanes.
   bool moves(int slot, int rows) const {
     if (slot < 0) return false;
     const std::size_t first = static_cast<std::size_t>(slot);

@@ -10,7 +10,7 @@
 
 namespace mbsopt {
 
-// Whether the load (force in global axes, moment in body axes) changes with the state.
+// Returns whether the load (force in global axes, moment in body axes) changes with the state.
 bool depends_on_state(const AppliedForce& force);
 
 long derivative_blocks(const MechanismData& data);

@@ -9,7 +9,7 @@ struct MechanismData;
 // If no joint leads from the ground to a group of bodies, paths start at its first body.
 int joints_to_farthest_body(const MechanismData& data);
 
-// Whether there is a loop of joints, or a drive. Otherwise the constraints' Jacobian never loses rank.
+// Returns whether there is a loop of joints, or a drive. Otherwise the constraints' Jacobian never loses rank.
 bool closes_loops(const MechanismData& data);
 
 }  // namespace mbsopt

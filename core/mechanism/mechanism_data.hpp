@@ -128,7 +128,7 @@ struct Energy {
 };
 // The potential is that of gravity, zero at the origin, and of springs with constant coefficients.   [J]
 Energy energy(const MechanismData& data, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
-// Whether only gravity and springs of known potential do work.
+// Returns whether only gravity and springs of known potential do work.
 bool conserves_energy(const MechanismData& data);
 
 }  // namespace mbsopt

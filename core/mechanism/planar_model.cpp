@@ -177,8 +177,8 @@ class Search {
     }
   }
 
-  // Whether bodies may lie at other heights than the ground, where a rod's length is not its length in the plane. Then
-  // a point, or a row along the normal, joins two heights.
+  // Returns whether bodies may lie at other heights than the ground, where a rod's length is not its length in the
+  // plane. Then a point, or a row along the normal, joins two heights.
   bool has_levels() const {
     for (const Constraint& c : data_.constraints) {
       const auto* point = std::get_if<Coincidence>(&c.primitive);
@@ -229,8 +229,8 @@ class Search {
     return "";
   }
 
-  // Whether a joint holds bodies in the plane. The answer comes from its first dot-1, which contains axis 2 if the
-  // joint has axes.
+  // Returns whether a joint holds bodies in the plane. The answer comes from its first dot-1, which contains axis 2 if
+  // the joint has axes.
   bool holds(const Constraint& c) const {
     const std::string& type = scene_.joints[at(c.joint)].type;
     const Lies axis = lies(c.body2, std::get<Dot1>(c.primitive).s2, c.slot2);

@@ -35,8 +35,8 @@ class SceneFacts {
   // Parameters, definitions, and the other names that an expression may use.
   const Symbols& symbols(Names names) const;
 
-  // Whether a definition or a sensor's expression cannot be evaluated: it is circular, nested too deep, or has unknown
-  // names.
+  // Returns whether a definition or a sensor's expression cannot be evaluated: it is circular, nested too deep, or has
+  // unknown names.
   bool is_broken(const std::string& definition) const { return broken_.contains(definition); }
   // The circular and too deeply nested ones among them: path and fault.
   const std::vector<std::pair<std::string, std::string>>& endless_definitions() const { return endless_; }

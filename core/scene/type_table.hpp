@@ -16,7 +16,7 @@ struct Force;
 struct Joint;
 struct Sensor;
 
-// Whether a joint ties two other joints (gear, rack_pinion) and has no bodies of its own.
+// Returns whether a joint ties two other joints (gear, rack_pinion) and has no bodies of its own.
 bool ties_joints(const Joint& joint);
 
 // The quantities that a sensor is a function of; each one includes those before it.
@@ -64,7 +64,7 @@ bool has_word(std::string_view list, std::string_view word);
 std::string not_among(std::string_view what, std::string_view found, const std::vector<std::string>& available,
                       std::string_view later = "");
 
-// Whether friction in a joint resists sliding: `motion` decides if given, else a joint without an angle slides.
+// Returns whether friction in a joint resists sliding: `motion` decides if given, else a joint without an angle slides.
 bool is_sliding(std::string_view motion, std::string_view joint_type);
 
 // The dimension of a quantity other than expression, which scene_facts.hpp finds. nullopt stands for N or N m, which is

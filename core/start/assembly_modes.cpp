@@ -49,7 +49,7 @@ double distance(const VectorXd& a, const VectorXd& b) {
   return std::sqrt(sum);
 }
 
-// Whether a joint holds only because an axis or a normal is opposite to that in the first mode. Two or more dot
+// Returns whether a joint holds only because an axis or a normal is opposite to that in the first mode. Two or more dot
 // products of a joint prevent a motion between the two.
 bool is_inside_out(const MechanismData& d, const VectorXd& first, const VectorXd& q) {
   const StateLayout layout{d.n};

@@ -44,7 +44,7 @@ Linearisation linearise(const Mechanism& mechanism, const FormulationSettings& f
 // C (s - A)^-1 B + D: outputs x inputs. s = 2 pi i f is the response at f [Hz], s = 0 the static one.
 Eigen::MatrixXcd transfer(const Linearisation& x, std::complex<double> s);
 
-// Whether the state rests and stays at rest, except for rounding.
+// Returns whether the state rests and stays at rest, except for rounding.
 bool is_equilibrium(const Linearisation& x);
 
 // Natural frequency |lambda|/(2 pi) [Hz], and damping ratio -Re lambda/|lambda|: 0 for lambda = 0.

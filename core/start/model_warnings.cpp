@@ -178,7 +178,7 @@ void add_reactions(const Mechanism& mechanism, const AssemblyResult& start, std:
   }
 }
 
-// Whether the ground holds the centre of mass of every body, so that gravity moves nothing.
+// Returns whether the ground holds the centre of mass of every body, so that gravity moves nothing.
 bool is_balanced(const MechanismData& d) {
   std::vector<bool> held(at(d.n) + 1, false);
   held[0] = true;

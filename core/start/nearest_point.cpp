@@ -226,7 +226,7 @@ class Search {
     result_.linearisation.set_hessian(hessian_at(equations_, result_));
   }
 
-  // Whether steps are at rounding level, or no longer shrink just above it.
+  // Returns whether steps are at rounding level, or no longer shrink just above it.
   bool converged(double length) {
     if (length <= 2 * kEpsilon * size()) return true;
     if (length < 0.5 * shortest_) {
@@ -236,7 +236,7 @@ class Search {
     return shortest_ < 1e-11 * size() && ++waited_ >= 2;
   }
 
-  // Whether the violation still falls from time to time.
+  // Returns whether the violation still falls from time to time.
   bool gets_closer() {
     const double violation = scaled_violation(result_.F);
     if (violation < 0.7 * closest_ || violation < 1e-9) {
@@ -246,7 +246,7 @@ class Search {
     return --patience_ > 0;
   }
 
-  // Whether the minimum is strict: the nearest point moves at most 1e9 times as far as the guess.
+  // Returns whether the minimum is strict: the nearest point moves at most 1e9 times as far as the guess.
   bool is_minimum() const {
     const VectorXd& lambda = result_.linearisation.reduced_eigenvalues();
     return lambda.size() == 0 || lambda(0) > 1e-9;

@@ -28,7 +28,7 @@ class EventTimes {
     while (next_ < times_.size() && t >= times_[next_] - gap_) ++next_;
     return next_ < times_.size() ? times_[next_] - gap_ : end_;
   }
-  // Whether a step that ends at t1 has reached the event of stop_after().
+  // Returns whether a step that ends at t1 has reached the event of stop_after().
   bool reached(double t1) const { return next_ < times_.size() && t1 >= times_[next_] - 1.5 * gap_; }
   double resume_time() const { return times_[next_] + gap_; }
 

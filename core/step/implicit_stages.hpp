@@ -46,7 +46,7 @@ class ImplicitStages {
   // After an accepted step.
   void accept(const Step& step);
 
-  // Whether a failure may be cured at the same step size, by a new Jacobian.
+  // Returns whether a failure may be cured at the same step size, by a new Jacobian.
   bool stale() const { return age_ > 0 && own_steps_ == 0; }
   void renew() { renew_ = true; }
   // Fastest contraction is left alone while the step changes by less than this.

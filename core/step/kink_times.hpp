@@ -107,9 +107,9 @@ class KinkControl {
   double gap() const { return kinks_.any() ? 1.5 * kinks_.gap() : 0; }
   bool crosses() const { return state_ == State::crosses; }
   bool meets() const { return state_ == State::meets; }
-  // Whether kinks allow less than h.
+  // Returns whether kinks allow less than h.
   bool limits(double h) const { return across_ < h; }
-  // Whether a step that ends at t1 has come to the kink that choose() gave.
+  // Returns whether a step that ends at t1 has come to the kink that choose() gave.
   bool reached(double t1) const { return state_ != State::clear && t1 >= kink_ - 1.5 * kinks_.gap(); }
   double resume_time() const { return kink_ + kinks_.gap(); }
 

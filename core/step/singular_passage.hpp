@@ -36,9 +36,9 @@ class SingularPassage {
   void accept();
   // A step from t that regards the next singular position. It is at most the wanted size, or a little more.
   double propose(double t, double wanted, double most) const;
-  // Whether a step from t by h passes a singular position, or is next to a step that does.
+  // Returns whether a step from t by h passes a singular position, or is next to a step that does.
   bool near(double t, double h) const;
-  // Whether a step passed one after t.
+  // Returns whether a step passed one after t.
   bool passed_since(double t) const { return behind_ >= t; }
 
   // The best position of t* in a step, 0 to 1.

@@ -22,7 +22,7 @@ std::string below_min_step(StepOutcome outcome, double t, double min_step);
 std::string too_long_run(double span, double longest);
 // Tolerances below the rounding errors of numbers.
 std::string too_few_digits(const IntegratorSettings& settings, double t);
-// Whether they are, for the state y, in the norm of the step-size control.
+// Returns whether they are, for the state y, in the norm of the step-size control.
 bool beyond_digits(const ComponentTolerances& tolerances, const Eigen::VectorXd& y);
 // Where S = M + alpha J'J may have lost M to rounding: what to change, as the end of a message.
 std::string about_alpha(const FormulationSettings& formulation);

@@ -18,8 +18,8 @@ inline int largest_implicit_group(const Method& rk) {
   return largest;
 }
 
-// Whether a step's result depends on the group through its weights, dense output, or later stages. An error estimate
-// does not count, because derivatives hold steps fixed.
+// Returns whether a step's result depends on the group through its weights, dense output, or later stages. An error
+// estimate does not count, because derivatives hold steps fixed.
 inline bool is_used(const Method& rk, const StageGroup& g, bool dense) {
   if (dense) return true;
   for (int i = g.first; i <= std::min(g.last, rk.stages - 1); ++i) {

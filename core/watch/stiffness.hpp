@@ -49,10 +49,10 @@ class StiffnessWatch {
   double stiffest_ = 0;
 };
 
-// Whether stability limited most steps, and as many as stiff motion takes.
+// Returns whether stability limited most steps, and as many as stiff motion takes.
 bool is_stability_limited(const SimulationStatistics& statistics);
-// Whether stability limited enough steps to make their derivatives wrong: a stretch of them suffices, a tenth of a long
-// run.
+// Returns whether stability limited enough steps to make their derivatives wrong: a stretch of them suffices, a tenth
+// of a long run.
 bool may_spoil_derivatives(const SimulationStatistics& statistics);
 
 // "the step is limited by stability in 93 % of the steps ..." with a remedy; empty if there are too few such steps. Set

@@ -17,7 +17,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kJumpRungs = 3;  // the smallest: further off, frozen steps have errors of their own
 
-// Whether all runs of the difference took the steps of the base run.
+// Returns whether all runs of the difference took the steps of the base run.
 bool on_base_steps(const VectorXd& largest, Index i, double other_steps) { return largest(i) < 0.75 * other_steps; }
 
 }  // namespace

@@ -36,7 +36,7 @@ class TrueLimits {
   bool move(DesignProgram& program, const Eigen::VectorXd& c, const std::vector<std::optional<double>>& true_values,
             const Eigen::VectorXi& sides);
 
-  // Whether the true values keep the limits, used or not.
+  // Returns whether the true values keep the limits, used or not.
   bool hold(const DesignProgram& program, const std::vector<std::optional<double>>& true_values) const;
   // Gives the program the bounds of these limits, all inequalities.
   void set_inequalities(DesignProgram& program) const;

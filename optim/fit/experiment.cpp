@@ -30,7 +30,7 @@ Program compiled(const Field& field, const Symbols& symbols, const std::string& 
   }
 }
 
-// Whether time acts on the scene other than through its state.
+// Returns whether time acts on the scene other than through its state.
 bool depends_on_time(const Scene& scene) {
   bool found = !scene.drives.empty() || !scene.signals.empty();
   FieldVisitor visitor(

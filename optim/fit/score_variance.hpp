@@ -61,7 +61,7 @@ class ScoreVariance {
   Eigen::MatrixXd within(const Eigen::MatrixXd& scores) const;   // B of Newey and West
   Eigen::MatrixXd between(const Eigen::MatrixXd& scores) const;  // B between records
   bool is_between(bool of_one_record) const { return type_ == CovarianceType::windows && !of_one_record; }
-  // Whether a motion is in several windows, so that left_out() serves parameters that act in more than one.
+  // Returns whether a motion is in several windows, so that left_out() serves parameters that act in more than one.
   bool has_windows() const { return records_.size() > motions_.size(); }
   // Each record's z as a fit to the other records would leave it. inverse: (J'J)^-1, 0 of parameters held by a bound.
   Eigen::VectorXd left_out(Eigen::VectorXd z, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse) const;

@@ -39,7 +39,7 @@ class CostExpression {
   CostExpression(const Expression& expression, const Scene& scene);  // throws UnknownName
   bool is_zero() const { return is_zero_; }                          // the constant 0: costs nothing
   const void* id() const { return compiled_.get(); }                 // the same of copies
-  // Whether it is linear in parameters and sensors at any fixed time: its second derivatives are 0.
+  // Returns whether it is linear in parameters and sensors at any fixed time: its second derivatives are 0.
   bool is_linear() const;
   std::shared_ptr<const PointCost> bind(const Mechanism& mechanism) const;
   // y_rho is dy/drho in all parameters. variables selects those of rho for the result.

@@ -54,7 +54,7 @@ class FreeInstants {
   // Returns the instant of each point. progress has the meaning of RunOptions. Throws NoMotion, and
   // std::invalid_argument if drives leave some freedom.
   std::vector<Instant> nearest(const Mechanism& mechanism, const std::function<bool(double t)>& progress = {}) const;
-  // Whether an instant lies within the run, so that dD/dt = 0 there.
+  // Returns whether an instant lies within the run, so that dD/dt = 0 there.
   bool is_inside(double tau) const { return tau > settings_.start_time && tau < settings_.end_time; }
 
  private:

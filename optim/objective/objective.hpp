@@ -83,7 +83,7 @@ class Objective {
   bool is_eigenvalue() const { return mode_ != nullptr; }
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
   const ObjectiveSpec& spec() const { return spec_; }  // of one that is not
-  // Whether it is a sum of parts whose second derivatives in parameters and sensors are 0.
+  // Returns whether it is a sum of parts whose second derivatives in parameters and sensors are 0.
   bool is_linear() const;
 
   // The part that depends on the parameters alone, and += d/drho. It includes an eigenvalue, whose errors are

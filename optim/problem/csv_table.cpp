@@ -145,7 +145,7 @@ class Reader {
     return error == std::errc() && end == text.data() + text.size() && !text.empty();
   }
 
-  // Whether a text such as "1,5" is a number with a decimal comma.
+  // Returns whether a text such as "1,5" is a number with a decimal comma.
   static bool is_decimal_comma(std::string text) {
     std::replace(text.begin(), text.end(), ',', '.');
     double number = 0;

@@ -51,7 +51,7 @@ class ConnectedBodies {
   void look_at_all() {
     for (std::size_t i = 0; i < parent_.size(); ++i) seen_.insert(root_of(i));
   }
-  // Whether any of them is connected with an observed body.
+  // Returns whether any of them is connected with an observed body.
   bool matter(const std::vector<std::string>& bodies) {
     for (const std::string& body : bodies)
       if (const auto it = index_.find(body); it != index_.end() && seen_.contains(root_of(it->second))) return true;
@@ -111,7 +111,7 @@ class FieldSearch {
   }
 
  private:
-  // Whether the sensor reads one of the bodies; it may also read others.
+  // Returns whether the sensor reads one of the bodies; it may also read others.
   bool reads(const Sensor& sensor, const std::set<std::string>& bodies) const {
     if (measures_everything(sensor)) return false;
     const std::vector<std::string> read = bodies_of(sensor);

@@ -29,7 +29,8 @@ class ActiveSet {
 
  private:
   VectorXd gradient() const { return A_.transposed_times(A_ * d_ - b_); }
-  // Whether the variable is at a bound beyond which the sum would fall. A variable with equal bounds cannot move.
+  // Returns whether the variable is at a bound beyond which the sum would fall. A variable with equal bounds cannot
+  // move.
   bool pushes_out(Index k, double g) const {
     return (d_(k) <= lower_(k) && g > 0) || (d_(k) >= upper_(k) && g < 0) || lower_(k) >= upper_(k);
   }

@@ -61,7 +61,7 @@ class Round : public LeastSquaresProblem {
     return W_.cwiseProduct(at_x_.z.tail(W_.size())).norm() / std::max(z.norm(), kNoResidual);
   }
 
-  // Whether every equation holds within its own errors.
+  // Returns whether every equation holds within its own errors.
   bool closed() const {
     const Eigen::ArrayXd c = at_x_.z.tail(W_.size()).array().abs();
     return given_.closed.size() == c.size() && (c <= given_.closed.array()).all();

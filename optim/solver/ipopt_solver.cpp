@@ -61,7 +61,8 @@ class Adapter : public Ipopt::TNLP {
   bool second_order() const { return second_order_; }
   int left_newton_at() const { return left_newton_at_; }  // iteration; 0: never
 
-  // Whether the start is feasible and the objective falls nowhere within the bounds. The barrier would only lead away.
+  // Returns whether the start is feasible and the objective falls nowhere within the bounds. The barrier would only
+  // lead away.
   bool start_is_optimal() {
     const double distance = optimality(problem_, points_.x(), *point_);
     if (!points_.feasible(*point_) || distance > options_.tolerance) return false;
@@ -178,7 +179,7 @@ class Adapter : public Ipopt::TNLP {
   // The optimality of the end point of a stalled search.
   double distance() const { return watch_.most_stationary().distance; }
 
-  // Whether a feasible point on the way is better than Ipopt's end point by more than the tolerance.
+  // Returns whether a feasible point on the way is better than Ipopt's end point by more than the tolerance.
   bool passed_a_better_point() {
     if (final_.size() == 0 || !points_.have_best() || !evaluate(final_)) return false;
     const double gain = (point_->f - points_.best().f) * problem_.f_scale;

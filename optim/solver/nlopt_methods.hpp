@@ -23,7 +23,7 @@ const NloptMethod* find_nlopt_method(std::string_view name);  // nullptr: no suc
 std::string_view nlopt_method_names();                        // "slsqp mma ..."
 std::string_view nlopt_methods_by_kind();                     // "local methods with gradients (slsqp, ...) and ..."
 
-// Whether the method uses limited-memory BFGS.
+// Returns whether the method uses limited-memory BFGS.
 bool keeps_pairs(const NloptMethod& method);
 
 // The default is 500 for local methods with gradients, 500 (n + 1) for those without, and 1000 (n + 1) for global ones.

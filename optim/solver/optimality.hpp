@@ -30,7 +30,8 @@ struct Stationarity {
   double distance = 0;          // the optimality
   Eigen::VectorXd multipliers;  // y
   Eigen::VectorXd pulls;        // |y_i S_i c_x,i|_inf: the part of r that constraint i balances
-  // Whether constraint i holds the objective back: more than the tolerance and the distance would show without it.
+  // Returns whether constraint i holds the objective back: more than the tolerance and the distance would show without
+  // it.
   bool binds(Eigen::Index i, double tolerance) const { return pulls(i) > std::max(tolerance, distance); }
 };
 Stationarity stationarity(const NonlinearProgram& problem, const Eigen::VectorXd& x, const NlpPoint& point);

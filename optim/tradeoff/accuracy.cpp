@@ -126,7 +126,7 @@ class Chooser {
     return settings;
   }
 
-  // Whether the run shows that an explicit method is wrong. Keeps its results.
+  // Returns whether the run shows that an explicit method is wrong. Keeps its results.
   bool is_wrong_method(const Point& point) {
     const SimulationStatistics& s = point.answer.statistics;
     if (implicit_ || s.watched_steps == 0) return false;
@@ -139,8 +139,8 @@ class Chooser {
     return is_stability_limited(s);
   }
 
-  // Whether an implicit method needs less than half of the right-hand sides that an unfinished explicit run would need.
-  // Their number does not depend on chance, but the time does.
+  // Returns whether an implicit method needs less than half of the right-hand sides that an unfinished explicit run
+  // would need. Their number does not depend on chance, but the time does.
   bool implicit_is_cheaper(const Point& unfinished) {
     const SimulationSettings settings = settings_at("radau5", unfinished.rtol(), base_.integrator.max_steps);
     const Answer implicit = answer(settings);

@@ -34,7 +34,7 @@ std::vector<double> decades(int from, int to, int stride = 1) {
   return values;
 }
 
-// Whether runs of one scene are the same.
+// Returns whether runs of one scene are the same.
 bool same(const SimulationSettings& a, const SimulationSettings& b) {
   return a.integrator == b.integrator && a.formulation == b.formulation;
 }
@@ -156,8 +156,8 @@ class Sweep {
     return curves;
   }
 
-  // Whether an implicit method needs far fewer right-hand sides at a usual tolerance. Their number does not depend on
-  // chance, but the time does.
+  // Returns whether an implicit method needs far fewer right-hand sides at a usual tolerance. Their number does not
+  // depend on chance, but the time does.
   bool stiff() const {
     const auto evaluations = [&](const char* integrator) {
       for (const TradeoffRow& row : result_.rows) {

@@ -21,7 +21,8 @@ namespace mbsopt {
 // NaN if the row is not ok or has no such error; such rows raise no bound.
 void bound_errors(std::vector<TradeoffRow>& rows);
 
-// Whether an answer with this error is nearer than zero, or for the motion than the start: a relative error is below 1.
+// Returns whether an answer with this error is nearer than zero, or for the motion than the start: a relative error is
+// below 1.
 bool better_than_zero(const Quantity& quantity, double error);
 
 // Indices of rows from loose to tight; only rows whose bound is better than zero.

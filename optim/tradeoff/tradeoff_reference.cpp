@@ -79,7 +79,7 @@ class Search {
     return c.change < kSettled;
   }
 
-  // Whether two candidates have settled on the same answer.
+  // Returns whether two candidates have settled on the same answer.
   bool agree(const std::vector<Candidate>& found) const {
     if (std::count_if(found.begin(), found.end(), has_settled) < 2) return false;
     return least_apart(found) < kAgreeing;
@@ -114,7 +114,7 @@ class Search {
     return best;
   }
 
-  // Whether a stage came so close to a singular position that its equations were regularised ones.
+  // Returns whether a stage came so close to a singular position that its equations were regularised ones.
   static bool is_unmet(const Candidate& c) { return c.answer.statistics.max_acceleration_residual > 1e-9; }
 
   // If these agree, nothing else counts.
@@ -216,7 +216,7 @@ class Search {
     reference.gradients_by = by;
   }
 
-  // Whether the gradients of b changed less than those of a by the last tightening of their tolerances.
+  // Returns whether the gradients of b changed less than those of a by the last tightening of their tolerances.
   bool settles_better(const Candidate& b, const Answer& of_b, const Candidate& a, const Answer& of_a,
                       GradientMethod method, const RunLimit& limit) const {
     const auto change = [&](SimulationSettings s, const Answer& now) {

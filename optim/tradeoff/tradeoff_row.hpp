@@ -21,7 +21,7 @@ struct TradeoffSetting {
 };
 // "dopri5 at rtol 1e-06", "adjoint, rk4 with steps of 0.005 s"
 std::string in_words(const TradeoffSetting& setting);
-// Whether it belongs to no curve: the scene's own settings and the defaults.
+// Returns whether it belongs to no curve: the scene's own settings and the defaults.
 bool stands_alone(const TradeoffSetting& setting);
 
 enum class RowStatus {
