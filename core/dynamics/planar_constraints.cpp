@@ -174,6 +174,45 @@ void add_angle_bar(const PlanarFrame<double>& f, const Multipliers1& z, PlanarFr
 
 Multipliers1 times(double s, const Multipliers1& z) { return {s * z.lambda, s * z.mu0, s * z.mu1, s * z.mu2}; }
 
+// Add the cotangent of the separation of the primitive's points, or those of a single row, to the frames and vectors.
+void add_separation_bar(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2,
+                        const PlanarJetBar& bar, PlanarFrameBar& bar1, PlanarFrameBar& bar2, Vectors<double>& s_bar) {
+  add_point_bar(f2, c.s2, bar, 1, bar2, s_bar.s2);
+  add_point_bar(f1, c.s1, bar, -1, bar1, s_bar.s1);
+}
+void add_row_bar(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2,
+                 const Multipliers1& z, PlanarFrameBar& bar1, PlanarFrameBar& bar2, Vectors<double>& s_bar) {
+  const auto changed = [](const PlanarFrame<double>& f, const Plane& s) { return f.turned(f.A * s); };
+  const Plane d_eta = f2.r_eta - f1.r_eta + changed(f2, c.s2) - changed(f1, c.s1);
+  switch (c.kind) {
+    case Kind::dot1:
+      add_vector_bar(f1, c.s1, product_bar(vector_of(f2, c.s2), changed(f2, c.s2), z), 1, bar1, s_bar.s1);
+      add_vector_bar(f2, c.s2, product_bar(vector_of(f1, c.s1), changed(f1, c.s1), z), 1, bar2, s_bar.s2);
+      break;
+    case Kind::dot2:
+      add_vector_bar(f1, c.s3, product_bar(separation(f1, f2, vectors(c)), d_eta, z), 1, bar1, s_bar.s3);
+      add_separation_bar(c, f1, f2, product_bar(vector_of(f1, c.s3), changed(f1, c.s3), z), bar1, bar2, s_bar);
+      break;
+    case Kind::distance:
+      add_separation_bar(c, f1, f2, distance_bar(separation(f1, f2, vectors(c)), d_eta, z), bar1, bar2, s_bar);
+      break;
+    case Kind::angle:
+      add_angle_bar(f2, times(c.sign, z), bar2);
+      add_angle_bar(f1, times(-c.sign, z), bar1);
+      s_bar.s2 = times_i(conj((c.sign * z.mu0) * inverse(c.s2)));
+      s_bar.s1 = times_i(conj((-c.sign * z.mu0) * inverse(c.s1)));
+      break;
+    case Kind::point:
+      break;
+  }
+}
+
+// J eta of a single row, for the virtual displacement in the frames.
+double virtual_change(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2) {
+  const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
+  return dot(J.force1, f1.r_eta) + dot(J.force2, f2.r_eta) + J.moment1 * f1.theta_eta + J.moment2 * f2.theta_eta;
+}
+
 }  // namespace
 
 PlanarColumn jacobian_of_row(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2) {
@@ -224,60 +263,26 @@ void PlanarConstraints::add_pull_back(const Frames& frames, RowLaws& laws, const
   for (const PlanarConstraint& c : model_->constraints) {
     const std::size_t i = at(c.body1), j = at(c.body2);
     const PlanarFrame<double>&f1 = frames[i], &f2 = frames[j];
-    Plane s1_bar, s2_bar, s3_bar;
+    Vectors<double> s_bar;
     if (c.kind == Kind::point) {
       const PlanarJetBar bar{point(weights.mu0, c), point(weights.mu1, c), point(weights.mu2, c),
                              point(weights.lambda, c)};
-      add_point_bar(f2, c.s2, bar, 1, bars[j], s2_bar);
-      add_point_bar(f1, c.s1, bar, -1, bars[i], s1_bar);
+      add_separation_bar(c, f1, f2, bar, bars[i], bars[j], s_bar);
     } else {
       const Multipliers1 unscaled{of(weights.lambda, c.row), of(weights.mu0, c.row), of(weights.mu1, c.row),
                                   of(weights.mu2, c.row)};
-      const Multipliers1 z = times(c.factor, unscaled);
-      const auto changed = [](const PlanarFrame<double>& f, const Plane& s) { return f.turned(f.A * s); };
-      const Plane d_eta = f2.r_eta - f1.r_eta + changed(f2, c.s2) - changed(f1, c.s1);
-      switch (c.kind) {
-        case Kind::dot1:
-          add_vector_bar(f1, c.s1, product_bar(vector_of(f2, c.s2), changed(f2, c.s2), z), 1, bars[i], s1_bar);
-          add_vector_bar(f2, c.s2, product_bar(vector_of(f1, c.s1), changed(f1, c.s1), z), 1, bars[j], s2_bar);
-          break;
-        case Kind::dot2: {
-          const Jet<Plane> d = separation(f1, f2, vectors(c));
-          add_vector_bar(f1, c.s3, product_bar(d, d_eta, z), 1, bars[i], s3_bar);
-          const PlanarJetBar bar = product_bar(vector_of(f1, c.s3), changed(f1, c.s3), z);
-          add_point_bar(f2, c.s2, bar, 1, bars[j], s2_bar);
-          add_point_bar(f1, c.s1, bar, -1, bars[i], s1_bar);
-          break;
-        }
-        case Kind::distance: {
-          const PlanarJetBar bar = distance_bar(separation(f1, f2, vectors(c)), d_eta, z);
-          add_point_bar(f2, c.s2, bar, 1, bars[j], s2_bar);
-          add_point_bar(f1, c.s1, bar, -1, bars[i], s1_bar);
-          break;
-        }
-        case Kind::angle:
-          add_angle_bar(f2, times(c.sign, z), bars[j]);
-          add_angle_bar(f1, times(-c.sign, z), bars[i]);
-          s2_bar = times_i(conj((c.sign * z.mu0) * inverse(c.s2)));
-          s1_bar = times_i(conj((-c.sign * z.mu0) * inverse(c.s1)));
-          break;
-        case Kind::point:
-          break;
-      }
+      add_row_bar(c, f1, f2, times(c.factor, unscaled), bars[i], bars[j], s_bar);
       if (c.slot_factor >= 0) {
-        const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
         const auto phi = [&](Order order) { return phi_of(order, c, f1, f2, vectors(c)); };
-        const double change =
-            dot(J.force1, f1.r_eta) + dot(J.force2, f2.r_eta) + J.moment1 * f1.theta_eta + J.moment2 * f2.theta_eta;
-        theta_bar(c.slot_factor) += unscaled.lambda * change +
+        theta_bar(c.slot_factor) += unscaled.lambda * virtual_change(c, f1, f2) +
                                     unscaled.mu0 * on_branch(c, laws, angles, phi(Order::phi)) +
                                     unscaled.mu1 * phi(Order::phi_dot) + unscaled.mu2 * phi(Order::phi_ddot);
       }
     }
-    const auto keep = [&](int slot, std::size_t body, const Plane& s_bar) {
-      if (slot >= 0) theta_bar.segment<3>(slot) += model_->bodies[body].in_body(s_bar);
+    const auto keep = [&](int slot, std::size_t body, const Plane& bar) {
+      if (slot >= 0) theta_bar.segment<3>(slot) += model_->bodies[body].in_body(bar);
     };
-    keep(c.slot1, i, s1_bar), keep(c.slot2, j, s2_bar), keep(c.slot3, i, s3_bar);
+    keep(c.slot1, i, s_bar.s1), keep(c.slot2, j, s_bar.s2), keep(c.slot3, i, s_bar.s3);
   }
   laws.add_pull_back(weights.mu0, weights.mu1, weights.mu2, scale, theta_bar, rho_bar);
 }
