@@ -58,8 +58,9 @@ class ForwardRun {
   void go(std::span<const double> observed, const RunOptions& options, const Hooks& hooks);
   void set_sensitivities(Sensitivities* sensitivities) { sensitivities_ = sensitivities; }
   Sensitivities* sensitivities() const { return sensitivities_; }
-  // The value of a running cost, or of its derivative. One beyond the range of a quadrature makes psi not finite, as an
-  // infinite sum would; from then on 0 is integrated, since a derivative so large may change its sign within rounding.
+  // The value of a running cost, or of its derivative. A value beyond the range of a quadrature makes psi not finite,
+  // as an infinite sum would. From then on 0 is integrated, since so large a derivative may change its sign within
+  // rounding.
   double bounded(double g, std::size_t quadrature);
 
   void require(int flag) const;  // throws std::runtime_error where CVODES refused what is always right

@@ -43,7 +43,7 @@ class AdjointSweep {
   }
 
  private:
-  // Of one objective.
+  // The cotangents of one objective.
   struct Bars {
     Eigen::VectorXd lambda, lambda_hat;  // at y1, from there on at y0; at y^
     Eigen::VectorXd theta, rho;          // of all that was swept

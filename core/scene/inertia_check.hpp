@@ -1,4 +1,4 @@
-// Whether a tensor can be the inertia of a body.
+// Tells whether a tensor can be the inertia of a body.
 //   The principal moments J1 <= J2 <= J3 of any distribution of mass are >= 0 and J3 <= J1 + J2.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Whether accuracy or stability limits the steps of an explicit method; stability limits them if the scene is stiff.
+// Tells whether accuracy or stability limits the steps of an explicit method. Stability limits them in a stiff scene.
 // The watch uses stages that the step has computed anyway.
 //
 //   |lambda| ~ |f(t, Y_b) - f(t, Y_a)| / |Y_b - Y_a|      Y_a, Y_b: two stages at the same time

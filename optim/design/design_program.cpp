@@ -153,7 +153,7 @@ CaseEvaluation DesignProgram::evaluation(const VectorXd& rho) {
   return best_.ok && best_.has_gradients() && best_.rho == rho ? best_ : evaluator_.gradients(rho);
 }
 
-// Of the evaluator's objectives, case by case, exact or by Gauss-Newton.
+// Hessians of the evaluator's objectives, case by case, exact or by Gauss-Newton.
 bool DesignProgram::second_derivatives(const VectorXd& rho, std::vector<MatrixXd>& psi_rhorho) {
   struct Found {
     bool ok = false;

@@ -9,9 +9,10 @@
 
 namespace mbsopt {
 
-// Sentences with the path of the column before them: channels whose measured values span about 180/pi times as much as
-// the model at the start or at the end of the fit, angles more than half a turn, and are not explained by it. Columns
-// whose unit is stated are not doubted. data: of each experiment; z: residuals per sample, by the sigmas of the stack.
+// Returns a sentence, behind the path of the column, for each channel that seems to be in degrees. Its measured values
+// span about 180/pi times as much as the model at the start or at the end of the fit, angles more than half a turn, and
+// the fit does not explain them. A column with a stated unit is not doubted. `data` has a table per experiment, z the
+// residuals of all samples by the sigmas of the stack.
 std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSpec& spec,
                                       const std::vector<CsvTable>& data, const ExperimentStack& stack,
                                       const Eigen::VectorXd& z_start, const Eigen::VectorXd& z_end);

@@ -18,8 +18,9 @@
 
 namespace mbsopt {
 
-// null_space: independent columns, changes of the parameters over their sizes; rho and size: the parameters' values and
-// the positive numbers that the changes are relative to. units: of the parameters, "" where not known; empty: none is.
+// Returns the combinations of parameters that data determine, in words. The independent columns of null_space are
+// changes of the parameters over their positive sizes, rho their values. `units` has "" for an unknown unit, or is
+// empty if none is known.
 std::vector<std::string> determined_combinations(const Eigen::MatrixXd& null_space, const Eigen::VectorXd& rho,
                                                  const Eigen::VectorXd& size, const std::vector<std::string>& names,
                                                  const std::vector<std::string>& units = {});

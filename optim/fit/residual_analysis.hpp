@@ -1,4 +1,4 @@
-// Whether residuals are what the statistics of a fit take them for: independent noise about zero.
+// Tests whether residuals are independent noise about zero, as the statistics of a fit assume.
 //
 //   r_k         = sum e_i e_{i+k} / sum e_i^2,  e_i = z_i - mean                  autocorrelation
 //   Q           = n (n + 2) sum_{k=1..h} r_k^2/(n - k)  ~  chi^2(h)              Ljung and Box, Biometrika 65 (1978)

@@ -18,8 +18,8 @@
 // A parameter that acts in one record only has s_e = 0 at the fit. This record alone tells no variation between
 // records, so the variance is that of Newey and West. Correlations are those of Newey and West, too.
 //
-// The fit takes off the residuals what it can explain, so that B is too small. Of white noise it keeps, in the
-// direction a of the parameters, with the orthonormal basis q of the columns of J,
+// The fit takes off the residuals what it can explain, so that B is too small. In the direction a of the parameters it
+// keeps this part of white noise, with the orthonormal basis q of the columns of J,
 //   kept = 1 - sum_p a' B(J q_p) a/sum_i (a' J_i)^2,       B(J q_p): of the scores J_i q_ip
 // by which B is divided, whatever the noise (Bell and McCaffrey, Survey Methodology 28 (2002) 169).
 //

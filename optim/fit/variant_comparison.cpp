@@ -7,7 +7,7 @@
 namespace mbsopt {
 namespace {
 
-// Of fitted samples, by the sigmas of `scale`.
+// The squares of the residuals of fitted samples over the sigmas of `scale`.
 double sum_of_squares(const IdentificationResult& fit, const IdentificationResult& scale) {
   double sum = 0;
   for (const ResidualRow& row : fit.residuals)

@@ -14,8 +14,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// The weight as part of |z|. Of the values from 0.05 to 1, this one ends most runs of eighteen_points_starts.json, in
-// the fewest evaluations. With lighter limits the search passes into dead points. Heavier limits form valleys that
+// The weight as part of |z|. Among the values from 0.05 to 1 it ends most runs of eighteen_points_starts.json, in the
+// fewest evaluations. With lighter limits the search passes into dead points. Heavier limits form valleys that
 // steps follow slowly.
 constexpr double kLimitWeight = 0.15;
 // The weight rises if a converged round leaves more than a quarter of |c - P(s)|: Nocedal and Wright, framework 17.3.

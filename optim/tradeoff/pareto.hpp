@@ -9,7 +9,8 @@
 
 namespace mbsopt {
 
-// Returns whether each setting is on the front. A setting with infinite cost or error never is. Of equals the first is.
+// Returns whether each setting is on the front. A setting with infinite cost or error never is; the first of
+// equals is.
 inline std::vector<bool> pareto_front(const std::vector<double>& cost, const std::vector<double>& error) {
   const auto known = [&](std::size_t i) { return std::isfinite(cost[i]) && std::isfinite(error[i]); };
   std::vector<std::size_t> order(cost.size());

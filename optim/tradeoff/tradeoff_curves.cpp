@@ -26,7 +26,7 @@ void bound_errors(std::vector<TradeoffRow>& rows) {
 
 namespace {
 
-// Of rows from loose to tight, returns those that cost less than every tighter one, in the same order.
+// Returns the rows that cost less than every tighter one, in the same order. `some` goes from loose to tight.
 template <typename Cost>
 std::vector<std::size_t> not_dominated(const std::vector<std::size_t>& some, const Cost& cost_of) {
   std::vector<std::size_t> kept;

@@ -35,7 +35,8 @@ struct WorkPrecisionCurve {
 std::vector<WorkPrecisionCurve> work_precision_curves(const std::vector<TradeoffRow>& rows,
                                                       const std::vector<Quantity>& quantities, std::size_t quantity);
 
-// Of rows from loose to tight, returns those that are faster than every tighter one, which a plot over time connects.
+// Returns the rows that are faster than every tighter one, which a plot over time connects. `some` goes from loose to
+// tight.
 // Times depend on the machine and on chance; a line's right-hand sides do not.
 std::vector<std::size_t> slower_and_slower(const std::vector<TradeoffRow>& rows, const std::vector<std::size_t>& some);
 
