@@ -1,7 +1,8 @@
 #include "core/dynamics/inertia_update.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 
@@ -36,7 +37,9 @@ void InertiaUpdate::set(const Inertias& added, SaddleSolver& solver, const Saddl
     const Eigen::Index at = 6 * static_cast<Eigen::Index>(i);
     Mu_.block<6, 6>(at, at) = added[i].M;
   }
-  inverse_ = Mu_ * (Eigen::MatrixXd::Identity(A_.rows(), A_.cols()) + A_ * Mu_).partialPivLu().inverse();
+  Eigen::MatrixXd I_AMu = A_ * Mu_;
+  I_AMu.diagonal().array() += 1;
+  inverse_ = Mu_ * inverse(I_AMu);
 }
 
 template <class X, class Multipliers>

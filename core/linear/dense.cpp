@@ -61,6 +61,13 @@ VectorXd definite_solve(const MatrixXd& A, const VectorXd& b, double threshold) 
   return factor.solve(b);
 }
 
+Eigen::MatrixXcd regular_solve(const Eigen::MatrixXcd& A, const Eigen::MatrixXcd& b) {
+  return A.partialPivLu().solve(b);
+}
+MatrixXd inverse(const MatrixXd& A) { return A.partialPivLu().inverse(); }
+
+VectorXd least_squares(const MatrixXd& A, const VectorXd& b) { return A.colPivHouseholderQr().solve(b); }
+
 // P A = L U, row by row; entries of L that are zero cost nothing.
 struct SquareFactor::Factors {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> LU;  // L below the diagonal

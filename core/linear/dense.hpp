@@ -36,6 +36,13 @@ Eigen::VectorXd cholesky_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& 
 // Does the same; returns an empty vector if a pivot is not positive, or below this part of the largest.
 Eigen::VectorXd definite_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, double threshold);
 
+// Solves A x = b of a regular complex matrix, and inverts a real one, by elimination with row pivoting.
+Eigen::MatrixXcd regular_solve(const Eigen::MatrixXcd& A, const Eigen::MatrixXcd& b);
+Eigen::MatrixXd inverse(const Eigen::MatrixXd& A);
+
+// Returns x with the least |A x - b|, by QR with column pivoting. If columns are dependent, x is 0 in some of them.
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
 // Returns an orthonormal basis of { x : A x = 0 } as columns, by QR of A' with column pivoting. Pivots below
 // `threshold` times the largest count as zero.
 Eigen::MatrixXd null_space(const Eigen::MatrixXd& A, double threshold);

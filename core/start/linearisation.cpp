@@ -160,8 +160,9 @@ Linearisation linearise(const Mechanism& mechanism, const FormulationSettings& f
 }
 
 Eigen::MatrixXcd transfer(const Linearisation& x, std::complex<double> s) {
-  const Eigen::MatrixXcd left = s * Eigen::MatrixXcd::Identity(x.A.rows(), x.A.cols()) - x.A;
-  return x.C * left.partialPivLu().solve(Eigen::MatrixXcd(x.B)) + x.D;
+  Eigen::MatrixXcd left = -x.A;
+  left.diagonal().array() += s;
+  return x.C * regular_solve(left, x.B) + x.D;
 }
 
 bool is_equilibrium(const Linearisation& x) {

@@ -57,7 +57,7 @@ class LocalPolynomial {
       for (Index k = 0; k < powers.cols(); ++k) powers(i, k) = std::pow(tau / reach_, k);
       values(i) = value;
     }
-    coefficients_ = powers.colPivHouseholderQr().solve(values);
+    coefficients_ = least_squares(powers, values);
   }
 
   double at(double t) const {

@@ -1,10 +1,11 @@
 #include "optim/solver/optimality.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 namespace {
@@ -31,7 +32,7 @@ struct Multiplier {
 VectorXd on(const std::vector<Index>& passive, const MatrixXd& A, const VectorXd& b) {
   MatrixXd part(A.rows(), static_cast<Index>(passive.size()));
   for (std::size_t j = 0; j < passive.size(); ++j) part.col(static_cast<Index>(j)) = A.col(passive[j]);
-  return part.colPivHouseholderQr().solve(b);
+  return least_squares(part, b);
 }
 
 }  // namespace
