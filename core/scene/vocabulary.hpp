@@ -114,9 +114,9 @@ void describe(auto& v, Like<Parameter> auto& p) {
   v.plain("value", p.value, kAny, {"where a run starts, SI", Need::required});
   v.plain("lower", p.lower, kAny, {"lower bound, SI"});
   v.plain("upper", p.upper, kAny, {"upper bound, SI"});
-  v.choice("scale", p.scale, kParameterScales, {"how an optimiser sees it"});
+  v.choice("scale", p.scale, kParameterScales, {"how an optimiser scales the parameter"});
   v.text("unit", p.unit, {"SI unit of the value, such as N/m; expressions are checked against it"});
-  v.plain("allow_unused", p.allow_unused, kAny, {"true: not an error that nothing depends on it"});
+  v.plain("allow_unused", p.allow_unused, kAny, {"true: no error if nothing depends on the parameter"});
   v.object("prior", p.prior, {"what is known of it beforehand; a residual of its own in identify"});
 }
 
@@ -157,7 +157,7 @@ void describe(auto& v, Like<RollPitchYawField> auto& o) {
 }
 
 void describe(auto& v, Like<Shape> auto& s) {
-  v.word("type", s.type, Words{"rod box sphere cylinder"}, {"what is drawn", Need::required});
+  v.word("type", s.type, Words{"rod box sphere cylinder"}, {"shape that is drawn", Need::required});
   v.point("from", s.from, "", {"one end, a point of the body"});
   v.point("to", s.to, "", {"the other end"});
   v.plain("radius", s.radius, kPositive, {"[m]"});
@@ -306,7 +306,7 @@ void describe(auto& v, Like<Torque> auto& f, const TypeRow& row) {
 
 void describe(auto& v, Like<BushingSpec> auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.reference("body1", f.body1, To::body, {"first body, whose axes count", need_of(row, "body1")});
+  v.reference("body1", f.body1, To::body, {"first body, whose axes the coefficients refer to", need_of(row, "body1")});
   v.reference("body2", f.body2, To::body, {"second body", need_of(row, "body2")});
   v.point("point1", f.point1, f.body1, {"point of body1 [m]", need_of(row, "point1"), kLength});
   v.point("point2", f.point2, f.body2, {"point of body2 [m]", need_of(row, "point2"), kLength});
@@ -336,8 +336,9 @@ void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
 void describe(auto& v, Like<UserForceSpec> auto& f, const TypeRow& row) {
   v.text("force", f.force, {"name of a force of a plug-in or of the program", need_of(row, "force")});
   v.references("bodies", f.bodies, To::body,
-               {"on which it acts, in its order; when absent those that it names itself", need_of(row, "bodies")});
-  v.named("parameters", f.parameters, {"its own, each an expression of parameters", need_of(row, "parameters")});
+               {"bodies of the force, in its order; when absent those that the force names", need_of(row, "bodies")});
+  v.named("parameters", f.parameters,
+          {"parameters of the force, each an expression of parameters of the problem", need_of(row, "parameters")});
 }
 
 void describe(auto& v, Like<Force> auto& f) {
@@ -377,8 +378,9 @@ void describe(auto& v, Like<Sensor> auto& s) {
           {"direction in the ground, or in body1", need_of(*row, "axis")});
   v.expression("value", s.value, Names::sensor,
                {"expression of t, parameters, definitions and other sensors", need_of(*row, "value")});
-  v.orientation("axes", s.axes,
-                {"of its axes in those of the body, as of a body's orientation", need_of(*row, "axes")});
+  v.orientation(
+      "axes", s.axes,
+      {"orientation of the sensor's axes in the body's axes, written like that of a body", need_of(*row, "axes")});
 }
 
 void describe(auto& v, Like<Condition> auto& c) {
@@ -426,9 +428,11 @@ void describe(auto& v, Like<IntegratorOptions> auto& o) {
 
 void describe(auto& v, Like<KindTolerances> auto& t) {
   v.plain("position", t.position, kPositive, {"of positions [m]; when absent the smallest of this object"});
-  v.plain("angle", t.angle, kPositive, {"of Euler parameters, half an angle; likewise"});
-  v.plain("velocity", t.velocity, kPositive, {"of velocities [m/s]; likewise"});
-  v.plain("rate", t.rate, kPositive, {"of the rates of Euler parameters [1/s]; likewise"});
+  v.plain("angle", t.angle, kPositive,
+          {"of Euler parameters (half an angle); when absent the smallest of this object"});
+  v.plain("velocity", t.velocity, kPositive, {"of velocities [m/s]; when absent the smallest of this object"});
+  v.plain("rate", t.rate, kPositive,
+          {"of the rates of Euler parameters [1/s]; when absent the smallest of this object"});
   v.values_of("bodies", t.bodies, To::body, kPositive, {"of all components of a body, by its name"});
 }
 
@@ -454,14 +458,14 @@ void describe(auto& v, Like<SimulationSettings> auto& s) {
             "(dynamics); auto: solved"});
   v.object("formulation", s.formulation, {"form of the equations of motion"});
   v.level("accuracy", s.accuracy, kAccuracies, kPositive,
-          {"wanted relative error of the objectives (of the motion where there is none), from which integrator and "
-           "tolerances are chosen: draft 1e-3, engineering 1e-5, reference 1e-9, or a number"});
+          {"wanted relative error of the objectives (of the motion if there are none), which chooses integrator and "
+           "tolerances: draft 1e-3, engineering 1e-5, reference 1e-9, or a number"});
   v.object("integrator", s.integrator, {"time integration"});
   v.instead_of("accuracy", "integrator", Words{"type rtol atol step options"});
   v.numbers("events", s.events, kAny,
             {"times at which a law may jump or have a kink: a step ends there [s]", Need::optional, dimension::kTime});
   v.plain("adjoint_memory_mib", s.adjoint_memory_mib, kPositive,
-          {"what an adjoint run may keep of the forward motion [MiB]; beyond it, steps are computed again"});
+          {"memory of an adjoint run for the forward motion [MiB]; steps that do not fit are computed again"});
 }
 
 void describe(auto& v, Like<Scene> auto& s) {

@@ -38,7 +38,7 @@ void describe(auto& v, Like<ObjectiveSample> auto& s) {
 }
 
 void describe(auto& v, Like<TrackTerm> auto& t) {
-  v.reference("sensor", t.sensor, To::sensor, {"what is to follow the data", Need::required});
+  v.reference("sensor", t.sensor, To::sensor, {"sensor that should follow the data", Need::required});
   describe_samples(v, t, "file");
   v.number("weight", t.weight, {"of each square"});
   v.choice(
@@ -49,14 +49,14 @@ void describe(auto& v, Like<TrackTerm> auto& t) {
 
 void describe(auto& v, Like<EigenvalueSpec> auto& e) {
   v.plain("mode", e.mode, kPositive,
-          {"which, from slow to fast at the values of the file, as `mbsopt linearise` counts"});
+          {"number of the mode, from slow to fast at the values of the file, as in `mbsopt linearise`"});
   v.word("value", e.value, Words{"frequency damping"}, {"natural frequency [Hz], or damping ratio"});
 }
 
 void describe(auto& v, Like<UserCostSpec> auto& c) {
   v.text("cost", c.cost, {"its name", Need::required});
   v.references("bodies", c.bodies, To::body, {"whose states it reads, in its order; all when absent"});
-  v.named("parameters", c.parameters, {"its own, each an expression of parameters"});
+  v.named("parameters", c.parameters, {"parameters of the cost, each an expression of parameters of the problem"});
 }
 
 void describe_means(auto& v, auto& means) {
@@ -71,7 +71,7 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
   v.list("track", o.track, {"added: weighted squares of sensor minus data at the rows of a CSV file"});
   v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
   describe_means(v, o.means);
-  v.object("eigenvalue", o.eigenvalue, {"alone: of a mode of the motion beside the initial equilibrium"});
+  v.object("eigenvalue", o.eigenvalue, {"alone: frequency or damping ratio of a mode near the initial equilibrium"});
   v.object("user", o.user, {"alone: a cost written in C++, of a plug-in or of the program"});
   v.plain("sharpness", o.sharpness, kPositive,
           {"of maximum_of, minimum_of, peak_to_peak_of: k in log(mean exp(k x))/k [1/unit of the expression]; 100 when "
@@ -79,7 +79,9 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
 }
 
 void describe(auto& v, Like<ObjectiveBound> auto& b) {
-  v.reference("objective", b.objective, To::objective, {"an objective; or, in its place, one of the next five"});
+  v.reference(
+      "objective", b.objective, To::objective,
+      {"objective to bound; or, in its place, one of maximum_of, minimum_of, peak_to_peak_of, rms_of and sampled"});
   describe_means(v, b.means);
   v.law("sampled", b.sampled, Names::objective, {"its value at each of the instants start_time + k every"});
   v.plain("every", b.every, kPositive, {"of sampled [s]"});
@@ -117,7 +119,7 @@ void describe(auto& v, Like<MultistartSpec> auto& m) {
            {"of design: assembly modes in which each start is designed, that of the poses in the file or all"});
   v.choice(
       "until", m.until_all_found, kUntil,
-      {"all_starts, or all_found: the starts end where fewer than half an optimum is expected beside those found"});
+      {"all_starts: run all; all_found: stop when less than half an optimum is expected in addition to those found"});
 }
 
 void describe(auto& v, Like<DriveLaw> auto& d) {
@@ -143,7 +145,7 @@ void describe(auto& v, Like<CaseSpec> auto& c) {
 void describe(auto& v, Like<DesignSpec> auto& d) {
   v.reference_or(
       "minimize", d.minimize, To::objective, {"the objective to minimise", Need::required}, [&](auto& inside) {
-        inside.word("over", d.over, Words{"sum max"}, {"of its values in the load cases, each by its weight"});
+        inside.word("over", d.over, Words{"sum max"}, {"sum or maximum of its weighted values in the load cases"});
         inside.plain("sharpness", d.sharpness, kPositive,
                      {"of max: k in log(sum exp(k x))/k [1/unit of the objective]; when absent 100 over the "
                       "largest at the start"});
@@ -156,7 +158,7 @@ void describe(auto& v, Like<DesignSpec> auto& d) {
 
 void describe(auto& v, Like<ChannelSpec> auto& c) {
   v.text("column", c.column, {"header of the column, with its unit (\"theta [deg]\") or without it", Need::required});
-  v.reference("sensor", c.sensor, To::sensor, {"what it measured", Need::required});
+  v.reference("sensor", c.sensor, To::sensor, {"sensor whose values the column holds", Need::required});
   v.text("unit", c.unit, {"of the column, instead of the unit in the header; without either it is SI"});
   v.plain("unwrap", c.unwrap, kAny, {"true: the column jumps by whole turns, which are taken out"});
   v.number("sigma", c.sigma, {"standard deviation of the noise; a number is in SI, also where the column is not"});
@@ -166,8 +168,8 @@ void describe(auto& v, Like<ChannelSpec> auto& c) {
   v.expression("delay", c.delay, Names::time_law,
                {"measured(t) = gain * sensor(t - delay) + bias + noise [s]", Need::optional, dimension::kTime});
   v.choice("estimate_sigma", c.estimate_sigma, kSigmaEstimates,
-           {"true: sigma is estimated from the residuals of this channel, from the given one on; shared: from those of "
-            "all fitted channels of this column that say so"});
+           {"true: sigma is estimated from the residuals of this channel, starting at the given one; shared: from all "
+            "fitted channels of this column with \"shared\""});
 }
 
 void describe(auto& v, Like<WindowsSpec> auto& w) {
@@ -197,8 +199,8 @@ void describe(auto& v, Like<ExperimentSpec> auto& e) {
   v.list("drives", e.drives, {"laws of drives in this experiment"});
   v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});
   v.object("windows", e.windows,
-           {"cuts the experiment into windows, in each of which the free parameters, which must act on the start, have "
-            "values of their own"});
+           {"cuts the experiment into windows, each with its own values of the free parameters; these must act on the "
+            "start"});
   v.choice("role", e.validate, kRoles, {"validate: scored, not fitted"});
 }
 
@@ -208,8 +210,8 @@ void describe(auto& v, Like<IdentificationSpec> auto& i) {
   v.plain("sigma_is_known", i.sigma_is_known, kAny,
           {"true: the covariance is not scaled by the variance of the residuals"});
   v.choice("covariance", i.covariance, kCovariances,
-           {"what standard errors take the residuals for: white noise, noise that is correlated in time (newey_west), "
-            "or noise that is independent between experiments only (windows); auto: as tests of the residuals say"});
+           {"noise that the standard errors assume: white, correlated in time (newey_west), or independent between "
+            "experiments only (windows); auto: chosen by tests of the residuals"});
   v.group("loss", {"what is summed over the residuals"}, [&](auto& inside) {
     inside.choice("type", i.loss.type, kLosses, {"loss function"});
     inside.plain("scale", i.loss.scale, kPositive,
