@@ -31,7 +31,7 @@ CLI::Validator one_of(const std::vector<std::string>& words) {
 }
 
 void add_keep_journal(CLI::App& sub, CommandOptions& options) {
-  sub.add_flag("--keep-journal", options.keep_journal, "keep journal.jsonl when the run has come to a good end");
+  sub.add_flag("--keep-journal", options.keep_journal, "keep journal.jsonl after a successful run");
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ void simulate_options(CLI::App& sub, CommandOptions& options) {
 
 void linearise_options(CLI::App& sub, CommandOptions& options) {
   problem_options(sub, options);
-  sub.add_option("--at", options.at, "the state that the simulation reaches then, instead of the initial one")
+  sub.add_option("--at", options.at, "time at which the simulated state is linearised (default: the initial state)")
       ->type_name("TIME");
   sub.add_option("--inputs", options.inputs, "parameters u of B and D: forces, stiffnesses, masses")
       ->delimiter(',')
@@ -90,9 +90,10 @@ void identify_options(CLI::App& sub, CommandOptions& options) {
       ->delimiter(',')
       ->type_name("NAME,...");
   sub.add_flag("--preflight", options.preflight, "say what the data hold and would determine, and fit nothing");
-  sub.add_option("--recover", options.recover, "known-truth recovery: fits of so many simulated records")
+  sub.add_option("--recover", options.recover, "known-truth recovery: number of simulated records to fit")
       ->check(CLI::Range(2, 1'000'000));
-  sub.add_option("--bootstrap", options.bootstrap, "intervals by fits of so many records with resampled residuals")
+  sub.add_option("--bootstrap", options.bootstrap,
+                 "bootstrap intervals: number of records with resampled residuals to fit")
       ->check(CLI::Range(2, 1'000'000));
   sub.add_option("--compare", options.compare, "another problem file: which model explains the data better")
       ->type_name("FILE.json");
@@ -105,7 +106,8 @@ void tradeoff_options(CLI::App& sub, CommandOptions& options) {
                  "seconds for the sweep, roughly; 0: only the file's own settings and the defaults")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  sub.add_option("--alpha", options.alpha, "instead of the sweep, what alpha does to the penalty form: 1e2:1e16")
+  sub.add_option("--alpha", options.alpha,
+                 "instead of the sweep, show the effect of alpha on the penalty form: 1e2:1e16")
       ->type_name("LOW:HIGH");
   sub.add_option("--apply", options.apply,
                  "also write recommended.json, the problem with the fastest settings of this accuracy: 1e-6")
@@ -119,7 +121,7 @@ void sweep_options(CLI::App& sub, CommandOptions& options) {
   sub.add_option("--vary", sweep.vary, "a parameter and its values: k1=10:20:5, or k1=10:20 with --samples; repeated")
       ->type_name("NAME=LOW:HIGH[:COUNT]")
       ->allow_extra_args(false);
-  sub.add_option("--samples", sweep.samples, "a Latin hypercube of so many points instead of the grid")
+  sub.add_option("--samples", sweep.samples, "number of points of a Latin hypercube, instead of the grid")
       ->check(CLI::Range(1, 10'000'000));
   sub.add_option("--seed", sweep.seed, "of the samples; drawn and kept in result.json otherwise");
   sub.add_option("--points", sweep.points, "a CSV file with a column per parameter, a row per point")

@@ -73,14 +73,16 @@ void print_design(std::ostream& out, const DesignResult& design, const Objective
                                                  : "");
   if (std::any_of(design.constraints.begin(), design.constraints.end(),
                   [](const DesignConstraint& c) { return c.price != 0; }))
-    out << fmt::format("price: fall of '{}' per unit by which the limit is eased\n", design.objective);
+    out << fmt::format("price: decrease of '{}' per unit by which the limit is relaxed\n", design.objective);
   if (design.limit_rounds > 0)
     out << fmt::format("{} to make limits hold for true extremes\n", counted(design.limit_rounds, "further round"));
   if (design.conflicts.empty()) return;
   TextTable conflicts({"limit in conflict", "missed by", "price"});
   for (const DesignConflict& c : design.conflicts)
     conflicts.add({c.limit, c.missed > 0 ? significant(c.missed) : "", significant(c.price)});
-  out << '\n' << conflicts.text() << "price: fall of the sum of relative violations per unit by which it is eased\n";
+  out << '\n'
+      << conflicts.text()
+      << "price: decrease of the sum of relative violations per unit by which the limit is relaxed\n";
 }
 
 void add_to_result(Json& result, const DesignResult& design) {

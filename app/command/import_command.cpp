@@ -22,7 +22,7 @@ int import_command(const CommandContext& context) {
   context.out << fmt::format("{}: {}, {}\n", path.string(), counted(imported.bodies, "body", "bodies"),
                              counted(imported.joints, "joint"));
   for (const std::string& words : imported.warnings) context.out << "warning: " << words << '\n';
-  for (const std::string& words : imported.changed) context.out << "said otherwise: " << words << '\n';
+  for (const std::string& words : imported.changed) context.out << "changed: " << words << '\n';
   for (const std::string& words : imported.dropped) context.out << "dropped: " << words << '\n';
   context.out << fmt::format("try: mbsopt simulate {}\n", path.string());
   return kDone;

@@ -17,8 +17,8 @@ int nothing_left(const CommandContext& context, const std::string& command, cons
   const std::filesystem::path folder = context.options.problem_file;
   const std::string result = read_text_file(folder / "result.json");
   const std::string message = read_json(result).value("message", "");  // of a failed run, with what to change
-  context.out << fmt::format("{}: its '{}' came to its end ({}); there is nothing to go on with{}\n", folder.string(),
-                             command, ended, message.empty() ? "" : ": " + message);
+  context.out << fmt::format("{}: its '{}' is finished ({}); there is nothing to resume{}\n", folder.string(), command,
+                             ended, message.empty() ? "" : ": " + message);
   if (context.json) *context.json << result;
   return kDone;
 }
@@ -75,7 +75,7 @@ int resume_command(const CommandContext& context) {
   if (command == "identify") return identify_command(again);
   if (command == "sweep") return sweep_command(again);
   throw std::invalid_argument(
-      fmt::format("{}: is of '{}', which cannot be gone on with", (folder / kJournalFile).string(), command));
+      fmt::format("{}: belongs to '{}', which cannot be resumed", (folder / kJournalFile).string(), command));
 }
 
 }  // namespace mbsopt

@@ -106,8 +106,7 @@ JournalContent read_journal(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / kJournalFile;
   const auto refuse = [&](const std::string& why) { throw OutputError(file.string() + ": " + why); };
   if (!std::filesystem::exists(file))
-    refuse(
-        "there is none; 'resume' goes on with a folder that 'design', 'identify' or 'sweep' of this version has begun");
+    refuse("there is none; 'resume' continues a folder that 'design', 'identify' or 'sweep' of this version has begun");
   const std::string text = text_of(file);
   JournalContent content;
   int number = 0;
@@ -119,7 +118,7 @@ JournalContent read_journal(const std::filesystem::path& folder) {
     if (content.seal.empty())
       refuse(fmt::format(
           "line {} is damaged, or not of this run: its checksum does not fit; {}", number,
-          number == 1 ? "start the run anew" : "remove this line and all after it, and 'resume' goes on from there"));
+          number == 1 ? "start the run anew" : "remove this line and all after it, and 'resume' continues from there"));
     if (number == 1)
       content.header = record, content.run = record.at("run").get<std::string>();
     else

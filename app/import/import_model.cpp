@@ -104,7 +104,7 @@ ImportedProblem imported_from(const std::string& text, const std::filesystem::pa
   const XmlElement root = parse_xml(text, name);
   ModelErrors errors(name);
   if (root.name != "robot" && root.name != "mujoco") {
-    errors.add(root, "is no model that is read: URDF begins with <robot>, MJCF with <mujoco>");
+    errors.add(root, "is not a model that import reads: URDF begins with <robot>, MJCF with <mujoco>");
     errors.throw_if_any();
   }
   ImportedModel model = root.name == "robot" ? urdf_model(root, name) : mjcf_model(root, name);
@@ -134,7 +134,7 @@ ImportedProblem imported_from(const std::string& text, const std::filesystem::pa
   imported.bodies = problem.at("bodies").size();
   imported.joints = problem.at("joints").size();
   imported.text = fmt::format("// Imported from {}.\n", file.filename().string()) +
-                  comment(imported.warnings, "Warnings:") + comment(imported.changed, "Said otherwise:") +
+                  comment(imported.warnings, "Warnings:") + comment(imported.changed, "Changed:") +
                   comment(imported.dropped, "Dropped (kinds of elements and attributes, with their first line):") +
                   json;
   return imported;

@@ -178,7 +178,7 @@ class MjcfReader {
         collect_joints(
             *child, {around.body, around.frame * placement(*child, around), childclass(*child, around), false}, joints);
         if (const XmlElement* const inertial = child->child("inertial"))
-          errors_.add(*inertial, "stands in a <frame>; it must stand in its body");
+          errors_.add(*inertial, "is in a <frame>; it must be directly in its body");
       }
     }
   }
@@ -295,7 +295,7 @@ class MjcfReader {
     std::vector<double> size = numbers(element, "size", text(element, around, "size").value_or("0"), errors_);
     Geom geom{.type = type, .size = Vector3d::Zero()};
     const std::optional<std::string> fromto = text(element, around, "fromto");
-    if (fromto && element.text("pos")) errors_.add(element, "pos: must not stand beside fromto, also that of a class");
+    if (fromto && element.text("pos")) errors_.add(element, "pos: must not be given with fromto, not even by a class");
     if (fromto && type != "sphere") {  // the z axis runs from one end to the other
       const Eigen::VectorXd ends = numbers(element, "fromto", *fromto, 6, errors_);
       const Vector3d from = ends.head<3>(), along = Vector3d(ends.tail<3>()) - from;

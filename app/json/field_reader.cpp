@@ -209,7 +209,7 @@ void FieldReader::inertia(std::string_view key, InertiaField& tensor, std::optio
     const Node* const inside_it = node->find("consistent");
     if (!inside_it) return read(*node, inside(key), findings_, tensor);
     if (node->keys.size() > 1)
-      findings_.add(*node, inside(key), "has \"consistent\" beside other keys; it stands alone");
+      findings_.add(*node, inside(key), "has \"consistent\" and other keys; \"consistent\" must be the only key");
     return read(*inside_it, child_path(inside(key), "consistent"), findings_, consistent.emplace());
   }
   std::array<Field, 3> diagonal;
@@ -330,10 +330,11 @@ void FieldReader::instead_of(std::string_view key, std::string_view object, cons
   if (!has(key) || !node || node->kind != Node::Kind::object) return;
   for (const std::string& field : words(fields.available))
     if (const Node* const value = node->find(field))
-      findings_.add(*value, child_path(inside(object), field),
-                    fmt::format("is chosen by {0}, and must not stand beside it: leave out one of the two ({1} is left "
-                                "out with --set {1}={{}})",
-                                inside(key), inside(object)));
+      findings_.add(
+          *value, child_path(inside(object), field),
+          fmt::format("is chosen by {0}, and must not be given as well: leave out one of the two ({1} is left "
+                      "out with --set {1}={{}})",
+                      inside(key), inside(object)));
 }
 
 void FieldReader::numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says) {

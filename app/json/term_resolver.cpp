@@ -23,7 +23,7 @@ class TermResolver {
   void load(std::vector<std::string>& plugins, bool allowed, const std::filesystem::path& folder) {
     if (!plugins.empty() && !allowed && !findings_.concerns("plugins"))
       add("plugins",
-          "names code that would run inside this program: --allow-plugins lets it, for files that you trust");
+          "names code that would run inside this program; if you trust the file, allow it by --allow-plugins");
     for (std::size_t i = 0; i < plugins.size(); ++i) {
       plugins[i] = (folder / plugins[i]).lexically_normal().string();
       if (!allowed) continue;

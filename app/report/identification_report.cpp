@@ -173,14 +173,14 @@ void add_experiments(HtmlPage& page, const Json& result) {
   page.table({"experiment", "channel", "role", "samples", "rms of measured - model", "sigma", "unit", "rms/sigma"},
              rows);
   page.heading("Are the residuals noise?");
-  page.paragraph(fmt::format(
-      "Of white noise p is below 0.01 in one of a hundred tests; here are {}. Where p is far below, the model misses "
-      "something. {}",
-      2 * tests.size(),
-      result.at("covariance") == "white"
-          ? "Then the standard errors, which take the residuals for white, are too small."
-          : "The standard errors allow for residuals that are correlated in time, but not "
-            "for a wrong model."));
+  page.paragraph(
+      fmt::format("For white noise p is below 0.01 in one of a hundred tests; here there are {}. Where p is far below, "
+                  "the model misses something. {}",
+                  2 * tests.size(),
+                  result.at("covariance") == "white"
+                      ? "Then the standard errors, which take the residuals for white, are too small."
+                      : "The standard errors allow for residuals that are correlated in time, but not "
+                        "for a wrong model."));
   page.table({"experiment", "channel", "mean", "lag-1 autocorrelation", "Ljung-Box", "lags", "its p", "runs of signs",
               "their p", "in words"},
              tests);

@@ -20,7 +20,7 @@ namespace {
 
 void add_reference(HtmlPage& page, const Json& result, const TradeoffReference& reference) {
   page.heading("Reference");
-  page.paragraph(fmt::format("{}, certified by {}: what the two are apart is how far errors can be told.",
+  page.paragraph(fmt::format("{}, certified by {}: smaller errors than the difference of these two cannot be measured.",
                              in_words(reference.first), in_words(reference.second)));
   std::vector<std::vector<std::string>> rows;
   for (const Quantity& q : reference.errors->quantities())
@@ -28,7 +28,7 @@ void add_reference(HtmlPage& page, const Json& result, const TradeoffReference& 
   page.table({"quantity", "errors are", "two methods apart"}, rows);
   const Json others = result.at("reference").value("without_integration", Json::array());
   if (!others.empty())
-    page.paragraph(fmt::format("No integration is behind {}: they are not measured.",
+    page.paragraph(fmt::format("Not measured, since they do not depend on the integration: {}.",
                                fmt::join(others.get<std::vector<std::string>>(), ", ")));
 }
 
@@ -221,9 +221,9 @@ std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff, const 
   const Json recommendations = result.value("recommendations", Json::array());
   const auto measured = std::ranges::count(tradeoff.rows, RowStatus::ok, &TradeoffRow::status);
   if (!tradeoff.reference.errors->moves())
-    page.verdict("Nothing moves, so that every setting is as exact as another.");
+    page.verdict("Nothing moves, so all settings are equally exact.");
   else if (!recommendations.empty())
-    page.verdict(fmt::format("Of {} settings that were measured the fastest {}.", measured,
+    page.verdict(fmt::format("{} settings were measured; the fastest {}.", measured,
                              recommendations.front().at("in_words").get<std::string>()));
   add_status(page, result);
   add_machine(page, result);

@@ -18,10 +18,9 @@ std::string in_words(const AccuracyChoice& choice) {
     errors += fmt::format("{}{} {:.1e}{} in {}", errors.empty() ? "" : ", ", rounding ? "at most" : "about", e.error,
                           e.relative ? "" : " (absolute)", e.quantity);
   }
-  return fmt::format(
-      "{} is asked for: {} at rtol {:g}, atol {:g} ({}). Estimated error: {}, by a run of {} at rtol {:g}",
-      accuracy_in_words(choice.wanted), s.type, s.rtol, s.atol, choice.why, errors, choice.verified_by.type,
-      choice.verified_by.rtol);
+  return fmt::format("{} is wanted: {} at rtol {:g}, atol {:g} ({}). Estimated error: {}, by a run of {} at rtol {:g}",
+                     accuracy_in_words(choice.wanted), s.type, s.rtol, s.atol, choice.why, errors,
+                     choice.verified_by.type, choice.verified_by.rtol);
 }
 
 std::string features_in_words(const SceneFeatures& f) {
@@ -88,9 +87,8 @@ bool settle_accuracy(Run& run, const Scene& simulated, const std::vector<Objecti
                                  counted(choice.simulations, "simulation"));
   if (!choice.reached)
     run.warn(
-        fmt::format("simulation.accuracy: {:.0e} cannot be had, the estimated error is {:.1e} (rounding, a chaotic "
-                    "motion, a singular "
-                    "position, or a law that is not smooth?)",
+        fmt::format("simulation.accuracy: {:.0e} is not reached, the estimated error is {:.1e} (rounding, a chaotic "
+                    "motion, a singular position, or a law that is not smooth?)",
                     choice.wanted, choice.largest_error()));
   return true;
 }

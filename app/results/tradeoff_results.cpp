@@ -158,13 +158,13 @@ void add_reference(Run& run, const TradeoffReference& reference) {
                   << table.text();
   for (const Quantity& q : errors.quantities()) {
     if (!q.is_doubtful()) continue;
-    run.warn(fmt::format("the reference of {} is known to {:.1e} only: errors below that cannot be told ({})", q.name,
+    run.warn(fmt::format("the reference of {} is known to {:.1e} only: smaller errors cannot be measured ({})", q.name,
                          q.certificate, doubt(q, run.problem.objectives)));
   }
   if (!errors.moves())
     run.warn(
-        fmt::format("nothing moves: the mechanism stays within {:.1e} m of its start, so that every setting is as "
-                    "exact as another. Start it off its equilibrium to compare settings",
+        fmt::format("nothing moves: the mechanism stays within {:.1e} m of its start, so all settings are equally "
+                    "exact. Start it off its equilibrium to compare settings",
                     errors.extent()));
   std::string others;
   for (const ObjectiveSpec& o : run.problem.objectives) {
@@ -174,7 +174,7 @@ void add_reference(Run& run, const TradeoffReference& reference) {
     others += (others.empty() ? "'" : ", '") + o.name + "'";
   }
   if (!others.empty())
-    run.context.out << fmt::format("not measured, since no integration is behind them: {}\n", others);
+    run.context.out << fmt::format("not measured, since they do not depend on the integration: {}\n", others);
 }
 
 void add_given_settings(Run& run, const Tradeoff& tradeoff) {

@@ -14,8 +14,8 @@ std::string verdict(const VariantComparison& test, const Variant& first, const V
   if (!test.none.empty()) return "no F-test: " + test.none;
   const std::string& larger = test.second ? second.name : first.name;
   std::string words =
-      fmt::format("F({}, {}) = {:.4g}, p {}: what {} has more explains the data {} by chance", test.more, test.freedom,
-                  test.F, test.p > 0 ? fmt::format("= {:.2g}", test.p) : "< 1e-300", larger,
+      fmt::format("F({}, {}) = {:.4g}, p {}: the additional parameters of {} explain the data {} chance", test.more,
+                  test.freedom, test.F, test.p > 0 ? fmt::format("= {:.2g}", test.p) : "< 1e-300", larger,
                   test.p < kSmall ? "better than" : "no better than");
   if (!test.white) words += "; residuals are correlated, so that p is too small";
   return words;

@@ -41,7 +41,7 @@ LongRun::~LongRun() {
   if (!journal_ || finished_) return;
   try {
     run_.progress.finish();
-    run_.context.err << fmt::format("the journal keeps what was computed; 'mbsopt resume {}' goes on from there\n",
+    run_.context.err << fmt::format("the journal keeps what was computed; 'mbsopt resume {}' continues from there\n",
                                     run_.folder.path().string());
   } catch (...) {  // the exception under way says more than this one
   }
@@ -64,7 +64,7 @@ void LongRun::refuse_what_has_changed() const {
   for (const char* key : {"version", "input_sha256", "data_sha256"}) {
     const Json before = earlier_.header.value(key, Json()), after = now.value(key, Json());
     if (before == after) continue;
-    throw OutputError(fmt::format("{}: was begun with another {}; it cannot go on: start '{}' anew",
+    throw OutputError(fmt::format("{}: was begun with another {} and cannot be resumed: start '{}' anew",
                                   (run_.folder.path() / kJournalFile).string(),
                                   std::string(key) == "version"        ? "version of mbsopt"
                                   : std::string(key) == "input_sha256" ? "content of the problem file"
@@ -94,7 +94,7 @@ void LongRun::add(const char* kind, const Json& content) {
 }
 
 void LongRun::stopped(const std::string& kept) {
-  const std::string words = fmt::format("{}; 'mbsopt resume {}' goes on", kept, run_.folder.path().string());
+  const std::string words = fmt::format("{}; 'mbsopt resume {}' continues", kept, run_.folder.path().string());
   failure_ ? run_.failed(*failure_ + "; " + words) : run_.stopped(words);
 }
 

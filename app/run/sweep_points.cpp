@@ -57,7 +57,8 @@ VariedRange range_of(const Scene& scene, const std::string& option) {
   if (parts.size() == 3) {
     const double count = number_in(parts[2], option);
     if (!(count >= 2 && count <= static_cast<double>(kMostPoints)) || count != std::floor(count))
-      throw std::invalid_argument(fmt::format("--vary {}: {} is no number of points, from 2 on", option, parts[2]));
+      throw std::invalid_argument(
+          fmt::format("--vary {}: {} is not a number of points; at least 2 are needed", option, parts[2]));
     range.count = static_cast<std::size_t>(count);
   }
   return range;
@@ -77,8 +78,7 @@ std::vector<Eigen::VectorXd> grid(const std::vector<VariedRange>& ranges) {
   for (const VariedRange& range : ranges) {
     if (range.count == 0)
       throw std::invalid_argument(
-          fmt::format("--vary {}=LOW:HIGH: says no number of points; LOW:HIGH:COUNT does, or "
-                      "--samples for all",
+          fmt::format("--vary {}=LOW:HIGH: gives no number of points; write LOW:HIGH:COUNT, or use --samples for all",
                       range.parameter.name));
     total *= range.count;
     if (total > kMostPoints)

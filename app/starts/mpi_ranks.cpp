@@ -112,7 +112,7 @@ std::unique_ptr<Ranks> mpi_ranks() {
   if (started_by_mpirun())
     throw std::runtime_error(
         "is one of several processes of mpirun, but was built without MPI: './dev setup --mpi', then build again; or "
-        "leave mpirun away, --threads N uses all cores of one machine");
+        "run it without mpirun: --threads N uses all cores of one machine");
   return nullptr;
 }
 #endif

@@ -189,7 +189,7 @@ void Adjoint::failed(int flag) {
   double t = settings_.end_time;
   CVodeGetCurrentTime(CVodeGetAdjCVodeBmem(run_.memory(), which_), &t);
   run_.stop_for(flag, t, "the adjoint's rates");
-  run_.result().message += ". This was on the way back, of the adjoint";
+  run_.result().message += ". This happened in the backward run of the adjoint";
 }
 
 bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
@@ -205,7 +205,7 @@ bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
       return false;
     }
     if (options.progress && !options.progress(settings_.end_time)) {
-      run_.stop(SimulationStatus::stopped, fmt::format("stopped on the way back, at t = {:.6g} s", next));
+      run_.stop(SimulationStatus::stopped, fmt::format("stopped in the backward run, at t = {:.6g} s", next));
       return false;
     }
   }

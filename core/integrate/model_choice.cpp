@@ -13,8 +13,9 @@ SceneError not_planar(const std::string& reason) {
 
 std::string why_not_planar(const Mechanism& mechanism, const SimulationSettings& settings, const Method* method) {
   if (!mechanism.data().planar) return mechanism.data().not_planar;
-  if (!method || method->implicit()) return "the planar model serves explicit Runge-Kutta methods only";
-  if (settings.formulation.projection == Projection::velocity) return "velocities alone are projected in space only";
+  if (!method || method->implicit()) return "the planar model is for explicit Runge-Kutta methods only";
+  if (settings.formulation.projection == Projection::velocity)
+    return "the projection of velocities alone needs the spatial model";
   return "";
 }
 
@@ -27,7 +28,8 @@ void add_model(const Mechanism& mechanism, const SimulationSettings& settings, M
   if (settings.model == ModelChoice::planar) throw not_planar(why_not_planar(mechanism, settings, method));
   summary.not_planar = settings.model == ModelChoice::spatial ? "simulation.model is \"spatial\""
                                                               : why_not_planar(mechanism, settings, method);
-  if (summary.not_planar.empty()) summary.not_planar = "the penalty form is planar only where simulation.model says so";
+  if (summary.not_planar.empty())
+    summary.not_planar = "the penalty form is planar only if simulation.model is \"planar\"";
 }
 
 Model model_of(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method) {

@@ -31,7 +31,7 @@ void add_condition(Compilation& model, std::size_t i) {
                      "velocities or Euler parameters");
   if (c.acceleration)
     throw SceneError(
-        where + ".acceleration: is of the command kinematics only; elsewhere accelerations follow from the forces");
+        where + ".acceleration: is for the command kinematics only; elsewhere accelerations follow from the forces");
   out.rate_sensor = sensor->rate(model.data);
   out.velocity_level = sensor->reads == Reads::velocities;
   out.modulo_turn = sensor->angle() >= 0 && !out.velocity_level;

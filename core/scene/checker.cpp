@@ -341,7 +341,7 @@ void Checker::tolerance(std::string_view key, double value, const std::optional<
   if (!kinds) return plain(key, value, kPositive, says);
   at(key).check(*kinds);
   if (!kinds->position && !kinds->angle && !kinds->velocity && !kinds->rate)
-    issue(path(key), "needs the tolerance of a kind of component: position, angle, velocity or rate");
+    issue(path(key), "needs at least one of the tolerances position, angle, velocity and rate");
 }
 
 }  // namespace mbsopt

@@ -404,9 +404,9 @@ void check_meaning(Checker& checker, const Scene& scene) {
   check_unique_names(checker, scene.drives, "a drive", in_list("drives"));
   check_unique_names(checker, scene.forces, "a force", in_list("forces"));
   if (scene.equilibrium && !scene.conditions.empty())
-    checker.issue("initial.conditions",
-                  "stand beside \"equilibrium\": true, which settles the whole initial state; "
-                  "give one or the other");
+    checker.issue(
+        "initial.conditions",
+        "are given with \"equilibrium\": true, which determines the whole initial state; give one or the other");
   for (const auto& [path, what] : checker.facts().endless_definitions()) checker.issue(path, what);
 }
 

@@ -108,9 +108,9 @@ void check_meaning(Checker& checker, const SimulationSettings& settings) {
   const IntegratorSettings& integrator = settings.integrator;
   if (integrator.step && span / *integrator.step > static_cast<double>(integrator.max_steps))
     checker.issue(child_path(checker.path("integrator"), "step"),
-                  "is " + text_of(*integrator.step) + " s: more steps to the end than max_steps, " +
+                  "is " + text_of(*integrator.step) + " s: the run would need more steps than max_steps, " +
                       text_of(static_cast<double>(integrator.max_steps)) +
-                      ", allows; take a longer step, or raise that");
+                      ", allows; take a longer step, or raise max_steps");
   if (settings.output_step && span / *settings.output_step > kMostRows)
     checker.issue(checker.path("output_step"),
                   "is " + text_of(*settings.output_step) + " s: more than " + text_of(kMostRows) +

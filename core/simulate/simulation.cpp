@@ -98,7 +98,7 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
   result.statistics.factorisations += replayer.factorisations();
   if (stopped) {
     result.status = SimulationStatus::stopped;
-    result.message = fmt::format("stopped on the way back, at t = {:.6g} s", t_back);
+    result.message = fmt::format("stopped in the backward run, at t = {:.6g} s", t_back);
     return run.finish();
   }
   if (!swept) {

@@ -176,8 +176,8 @@ class Statics {
     Index i = 0;
     const double most = z_.cwiseAbs().maxCoeff(&i);
     return fmt::format(
-        "where the search ended body '{}' would still be accelerated by {:.3g} {}; is there a spring or stop that "
-        "holds every free motion?",
+        "at the end of the search body '{}' still has an acceleration of {:.3g} {}; does a spring or stop hold every "
+        "free motion?",
         d_.body_names[static_cast<std::size_t>(i / 6 + 1)], most, i % 6 < 3 ? "m/s^2" : "rad/s^2");
   }
 

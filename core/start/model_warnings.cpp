@@ -169,12 +169,12 @@ void add_reactions(const Mechanism& mechanism, const AssemblyResult& start, std:
                                          d.joint_names[at(sensor->joint)])
                            : std::string("the effort of a drive");
     if (!told.emplace(what, true).second) continue;
-    warnings.push_back(fmt::format(
-        "{} is not determined: equations of joints depend on each other, and rigid bodies do not tell how these share "
-        "the load. The value is the share of least size, as the augmented Lagrangian finds it; derivatives leave out "
-        "how the shares change, and may be wrong. A joint with fewer equations (`validate` names the redundant ones) "
-        "settles it",
-        what));
+    warnings.push_back(
+        fmt::format("{} is not determined: equations of joints depend on each other, and a model of rigid bodies "
+                    "cannot tell how the joints share the load. The value is the solution of least size that the "
+                    "augmented Lagrangian finds. Derivatives neglect how the shares change, and may be wrong. Use a "
+                    "joint with fewer equations instead (`validate` names the redundant ones)",
+                    what));
   }
 }
 
@@ -195,11 +195,10 @@ void add_gravity(const MechanismData& d, std::vector<std::string>& warnings) {
   if (!d.planar) return;
   const Vector3d& g = d.gravity;
   if (std::hypot(g(d.planar->t1), g(d.planar->t2)) > kAlong * g.norm() || g.norm() == 0 || is_balanced(d)) return;
-  warnings.push_back(
-      fmt::format("gravity: is [{:g}, {:g}, {:g}] m/s^2, normal to the plane in which the mechanism moves: it moves "
-                  "nothing. The default is along -z; in a vertical x-y plane it is [0, -9.81, 0]. [0, 0, 0] says that "
-                  "none is meant",
-                  g(0), g(1), g(2)));
+  warnings.push_back(fmt::format(
+      "gravity: is [{:g}, {:g}, {:g}] m/s^2, normal to the plane in which the mechanism moves, so it has no effect. "
+      "The default is along -z; in a vertical x-y plane it is [0, -9.81, 0]. Set [0, 0, 0] if no gravity is meant",
+      g(0), g(1), g(2)));
 }
 
 // Warns of an axis in the plane: the angle about it never changes, or jumps by half a turn.
@@ -211,10 +210,10 @@ void add_axes(const MechanismData& d, std::vector<std::string>& warnings) {
     if (d.sensors[k]->angle() < 0) continue;
     const JointAngle& angle = d.angles[at(d.sensors[k]->angle())];
     if (angle.body1 != 0 || std::abs(angle.measure.s1.cross(angle.measure.s3).dot(normal)) > kAlong) continue;
-    warnings.push_back(fmt::format(
-        "sensors.{}: its axis is not the normal of the plane in which the mechanism moves, [{}, {}, {}]; the "
-        "angle about it says nothing of the motion",
-        d.sensor_names[k], normal(0), normal(1), normal(2)));
+    warnings.push_back(
+        fmt::format("sensors.{}: its axis is not the normal of the plane in which the mechanism moves, [{}, {}, {}]; "
+                    "the angle about it does not describe the motion",
+                    d.sensor_names[k], normal(0), normal(1), normal(2)));
   }
 }
 

@@ -17,8 +17,8 @@ std::string about_alpha(const FormulationSettings& f) {
 
 std::string too_long_run(double span, double longest) {
   return fmt::format(
-      "a run of {:.3g} s is too long for this motion, whose steps were {:.3g} s at most: the time could no longer be "
-      "told. Is simulation.end_time in seconds?",
+      "a run of {:.3g} s is too long for this motion, whose steps were {:.3g} s at most: double precision could no "
+      "longer resolve the time. Is simulation.end_time in seconds?",
       span, longest);
 }
 

@@ -62,7 +62,8 @@ std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& en
     const double omega = speeds(y, i, data_.n)(1);
     if (!(omega * (t_end - t) > std::numbers::pi * static_cast<double>(max_steps))) continue;
     const std::string& body = data_.body_names[static_cast<std::size_t>(i)];
-    if (!std::isfinite(omega)) return fmt::format("body '{}' turns at the start faster than numbers can say", body);
+    if (!std::isfinite(omega))
+      return fmt::format("body '{}' has an angular velocity at the start that is too large for a number", body);
     return fmt::format(
         "body '{}' turns at {:.3g} rad/s at the start. Each half turn takes a step at least, and until t = {:.6g} s "
         "there are more of them than simulation.integrator.max_steps, {}. Is the angular velocity in rad/s, and the "

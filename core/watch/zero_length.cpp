@@ -53,11 +53,11 @@ std::string through_zero_length(const MechanismData& d, double t0, const Eigen::
     if (a.u.dot(b.u) >= 0) continue;
     const double pull = pull_at_zero(f, t1, d.rho);
     if (pull == 0 || closest(a.d, a.ddot, b.d, b.ddot, t1 - t0) > kThroughZero * std::max(a.l, b.l)) continue;
-    const std::string what = std::isfinite(pull) ? fmt::format("its force of {:.3g} N turns round at once", pull)
+    const std::string what = std::isfinite(pull) ? fmt::format("its force of {:.3g} N reverses at once", pull)
                                                  : "its law has no finite value";
     return fmt::format(
         "there is no gradient: a tsda between '{}' and '{}' goes through zero length near t = {:.6g} s, where {}. Keep "
-        "its points apart (another place of theirs, a shorter run), or give it a \"law\" that is zero at length 0",
+        "its points apart (move them, or end the run earlier), or give it a \"law\" that is zero at length 0",
         d.body_names[static_cast<std::size_t>(f.body1)], d.body_names[static_cast<std::size_t>(f.body2)], t1, what);
   }
   return {};

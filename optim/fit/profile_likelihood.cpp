@@ -82,7 +82,7 @@ class Side {
       step = taken * std::clamp(rise > 0 ? kProfileStep / rise : kLongest, 0.25, kLongest);
       last = *next;
     }
-    if (!crossing) end("the data do not bound it as far as was looked");
+    if (!crossing) end("the data do not bound it in the range of the search");
   }
 
   std::vector<ProfilePoint> points;  // outward

@@ -36,7 +36,7 @@ std::vector<DesignIssue> least_squares_issues(const DesignSpec& spec, const std:
   for (const auto& [key, given] :
        {std::pair("hessian", optimizer.hessian != "lbfgs"),
         std::pair("lbfgs_history", optimizer.lbfgs_history.has_value()), std::pair("warm_start", optimizer.warm_start)})
-    if (given) issues.push_back({path + "." + key, "is of other optimisers; 'least_squares' has none"});
+    if (given) issues.push_back({path + "." + key, "is for other optimisers; 'least_squares' does not use it"});
   return issues;
 }
 
@@ -61,7 +61,7 @@ std::vector<DesignIssue> branch_issues(const Scene& scene) {
     if (joint.type == "rack_pinion" || joint.type == "screw" || (joint.type == "gear" && !joint.ratio.is_number()))
       issues.push_back({child_path("joints", i), "is a " + joint.type +
                                                      ", which begins at the poses in the file; other assembly modes "
-                                                     "have others, so that design.multistart.branches must be "
+                                                     "have other poses, so design.multistart.branches must be "
                                                      "\"guess\""});
   }
   return issues;
@@ -76,19 +76,19 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
   const NloptMethod* const method = find_nlopt_method(optimizer.type);
   if (optimizer.type == OptimizerSpec::kLeastSquares) append(least_squares_issues(spec, path), issues);
   if (method && optimizer.hessian != "lbfgs")
-    issues.push_back({path + ".hessian", "is of ipopt only; '" + optimizer.type + "' builds its own, if any"});
+    issues.push_back({path + ".hessian", "is for ipopt only; '" + optimizer.type + "' builds its own, if any"});
   if (!method && optimizer.hessian != "lbfgs" && is_cvodes(scene.simulation.integrator.type))
     issues.push_back({path + ".hessian", "is '" + optimizer.hessian +
                                              "', which needs a run on given steps; simulation.integrator.type is '" +
                                              scene.simulation.integrator.type + "', which cannot take them: 'lbfgs'"});
   if (optimizer.lbfgs_history) append(history_issues(optimizer, method, path + ".lbfgs_history"), issues);
   if (method && optimizer.warm_start)
-    issues.push_back({path + ".warm_start", "is of ipopt only, whose barrier leads away from the start; '" +
+    issues.push_back({path + ".warm_start", "is for ipopt only, whose barrier leads away from the start; '" +
                                                 optimizer.type + "' has none and begins at the given values"});
   if (!method && optimizer.warm_start && spec.multistart)
     issues.push_back({path + ".warm_start",
-                      "says that the given values are near the solution, which other starts of design.multistart are "
-                      "not; leave one of them out"});
+                      "says that the given values are near the solution, but the other starts of design.multistart are "
+                      "not; leave out one of the two"});
   if (optimizer.seed && !(method && method->random))
     issues.push_back({path + ".seed", "is given, but '" + optimizer.type + "' draws no random numbers"});
   if (method) {
@@ -149,11 +149,11 @@ std::optional<DesignIssue> curvature_issue(const Problem& problem) {
                                                        "' tracks points of free timing; take the optimizer "
                                                        "'least_squares', or 'lbfgs' or 'exact'"};
   if (!objective.is_linear() && !objective.is_eigenvalue()) return std::nullopt;
-  return DesignIssue{"design.optimizer.hessian",
-                     "is 'gauss_newton', but '" + name +
-                         "' is linear in its sensors and parameters or an eigenvalue, of whose second derivatives "
-                         "Gauss-Newton leaves nothing; "
-                         "it is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or 'exact'"};
+  return DesignIssue{
+      "design.optimizer.hessian",
+      "is 'gauss_newton', but '" + name +
+          "' is linear in its sensors and parameters or an eigenvalue; Gauss-Newton neglects all its second "
+          "derivatives and is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or 'exact'"};
 }
 
 }  // namespace mbsopt

@@ -318,8 +318,8 @@ GradientMethod Evaluator::available(GradientMethod method, std::string& choice) 
   if (by_cvodes && (method == GradientMethod::tlm || method == GradientMethod::adjoint)) {
     const GradientMethod instead =
         method == GradientMethod::tlm ? GradientMethod::cvodes_forward : GradientMethod::cvodes_adjoint;
-    choice = fmt::format("{}, where {} was asked for: {} has no discrete derivatives", to_string(instead),
-                         to_string(method), given.type);
+    choice = fmt::format("{} instead of {}: {} has no discrete derivatives", to_string(instead), to_string(method),
+                         given.type);
     return instead;
   }
   if (!by_cvodes && (method == GradientMethod::cvodes_forward || method == GradientMethod::cvodes_adjoint)) {

@@ -93,7 +93,7 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
   for (const Objective& objective : objectives) {
     if (objective.is_written_in_cpp())
       throw std::invalid_argument("the objective '" + objective.name() +
-                                  "' is written in C++ and says nothing of second derivatives");
+                                  "' is written in C++ and gives no second derivatives");
     if (objective.free_instants())
       throw std::invalid_argument("the objective '" + objective.name() +
                                   "' tracks points of free timing, which Gauss-Newton Hessians do not know");

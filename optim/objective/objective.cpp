@@ -72,7 +72,8 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
   for (std::size_t k = 0; k < spec.means.size(); ++k)
     if (spec.means[k]) mean_ = &kMeanKinds[k], expression = &spec.means[k], part = mean_->name;
   if (mean_ && (spec.running || spec.terminal || spec.parameters_only || !spec.samples.empty() || !spec.track.empty()))
-    throw std::invalid_argument(fmt::format("{}.{}: stands alone; other parts are given beside it", place, part));
+    throw std::invalid_argument(
+        fmt::format("{}.{}: must be the only part of its objective, but other parts are given", place, part));
   sharpness_ = spec.sharpness.value_or(ObjectiveSpec::kSharpness);
   duration_ = scene.simulation.end_time - scene.simulation.start_time;
   running_ = compile(*expression, std::string(part));

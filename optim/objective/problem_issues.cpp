@@ -99,7 +99,7 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   if (alone > 1 || (alone == 1 && sums))
     checker.issue(checker.path(),
                   "has one of " + joined(kinds) +
-                      " beside another part; each of them stands alone, so make it an objective of its own");
+                      " and another part; each of them must be the only part, so make it an objective of its own");
   if (objective.sharpness && !extreme)
     checker.issue(checker.path("sharpness"),
                   "is given without maximum_of, minimum_of or peak_to_peak_of, which it belongs to");

@@ -160,19 +160,19 @@ class DataCheck {
           {place_ + ".data",
            fmt::format(
                "{}: the record begins {:.6g} s after the start of the simulation, at {} s, and "
-               "lasts {:.6g} s: all the time before would be simulated. Take the first time off "
-               "the column '{}' (\"time_zero\": \"first\" does), or say by \"start_time\" where the experiment begins",
+               "lasts {:.6g} s: all the time before would be simulated. Subtract the first time from the column '{}' "
+               "(\"time_zero\": \"first\" does), or say by \"start_time\" where the experiment begins",
                place, first - start_, start_, span, experiment_.time)});
     else if (last - start_ < kResolved * std::max(std::abs(start_), std::abs(last)))
       issues_.push_back(
           {place_ + ".data",
            fmt::format("{}: times about {:.6g} s do not resolve the steps of a record "
-                       "of {:.6g} s: take the first time off the column '{}' (\"time_zero\": \"first\" does)",
+                       "of {:.6g} s: subtract the first time from the column '{}' (\"time_zero\": \"first\" does)",
                        place, last, last - start_, experiment_.time)});
     else if (span > kLong && experiment_.time_unit.empty() && !time_has_unit())
       issues_.push_back({place_ + ".time",
-                         fmt::format("{}: the record lasts {:.6g} s, {:.3g} days: is '{}' in s? Its unit in the header "
-                                     "or in \"time_unit\" (\"s\", \"ms\") tells",
+                         fmt::format("{}: the record lasts {:.6g} s, {:.3g} days: is '{}' in s? Give its unit in the "
+                                     "header or in \"time_unit\" (\"s\", \"ms\")",
                                      place, span, span / 86400, experiment_.time),
                          true});
   }
@@ -213,8 +213,8 @@ class DataCheck {
     const double angle = data_.column(channel.column)[row];
     if (!(std::abs(angle) > kMany)) return;
     issues_.push_back({channel_path(c, "column"),
-                       fmt::format("{}: '{}' is {:.6g} rad, {:.3g} turns: is the column in degrees? Its unit in the "
-                                   "header or in \"unit\" (\"deg\" or \"rad\") tells",
+                       fmt::format("{}: '{}' is {:.6g} rad, {:.3g} turns: is the column in degrees? Give its unit in "
+                                   "the header or in \"unit\" (\"deg\" or \"rad\")",
                                    data_.place(row), channel.column, angle, std::abs(angle) / (2 * std::numbers::pi)),
                        true});
   }

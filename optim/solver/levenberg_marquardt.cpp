@@ -140,7 +140,7 @@ class Search {
       point.ok = false, point.message = fmt::format(
                             "the squares of the residuals or of their derivatives are beyond all numbers: the largest "
                             "residual is {:.3g} (measured - model)/sigma, the largest derivative {:.3g}. Look for "
-                            "values that are none in the data, and at sigma, that of priors too",
+                            "wrong values in the data, and check sigma, also that of priors",
                             point.z.lpNorm<Eigen::Infinity>(), point.z_x.lpNorm<Eigen::Infinity>());
     if (!point.ok) {
       ++result_.failed_evaluations;

@@ -160,7 +160,7 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
   all.message =
       round.missed() > kLimitsHeld
           ? fmt::format("no point near satisfies all limits: one is missed by {:.1g} of its size", round.missed())
-          : "no further progress: the prices of the limits do not settle";
+          : "no further progress: the multipliers of the limits do not converge";
   return all;
 }
 

@@ -338,7 +338,7 @@ class Adapter {
                              "(max_evaluations){}",
                              counted(result_.evaluations, "point"), result_.failures()));
     put(SolverStatus::searched,
-        fmt::format("searched as long as asked, {}: the best point found, which a local method may improve{}",
+        fmt::format("searched to the given limit, {}: the best point found, which a local method may improve{}",
                     limit_words(), result_.failures()));
   }
 
@@ -353,7 +353,8 @@ class Adapter {
           "infeasible: no point near the last one satisfies the constraints; relax them or start elsewhere" + failures);
     if (code == NLOPT_MAXEVAL_REACHED) {  // requests of known points reached the limit
       if (method_.global) return say_searched();
-      return put(SolverStatus::no_progress, "no further progress: the method goes round in circles" + failures);
+      return put(SolverStatus::no_progress,
+                 "no further progress: the method returns to points that it has already tried" + failures);
     }
     if (method_.gradients && !method_.global) {
       const double distance = optimality(problem_, result_.x, result_.point);

@@ -194,7 +194,7 @@ TEST_CASE("what was chosen is said, stored and in the report", "[accuracy]") {
   CHECK(accuracy.at("errors").contains("track"));
   CHECK(result.at("warnings").empty());
   CHECK_THAT(content_of(folder.path / "out/report.html"),
-             Contains("engineering <span class=\"whole\">(1e-05)</span> is asked for"));
+             Contains("engineering <span class=\"whole\">(1e-05)</span> is wanted"));
 }
 
 TEST_CASE("an accuracy that cannot be had is a warning with the error that can", "[accuracy]") {
@@ -202,7 +202,7 @@ TEST_CASE("an accuracy that cannot be had is a warning with the error that can",
   const CommandOutcome outcome = run_command({"simulate", folder.write("rod.json", kPendulum), "--out",
                                               folder.file("out"), "--set", "simulation.accuracy=1e-17"});
   CHECK(outcome.exit_code == kDone);
-  CHECK_THAT(outcome.err, Contains("1e-17 cannot be had, the estimated error is"));
+  CHECK_THAT(outcome.err, Contains("1e-17 is not reached, the estimated error is"));
   CHECK(json_of(folder.path / "out/result.json").at("accuracy").at("reached") == false);
 }
 

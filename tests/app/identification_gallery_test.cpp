@@ -342,5 +342,5 @@ TEST_CASE("fields of losses, priors, drives and inertia that make no sense are f
              Contains("bodies[1].inertia.consistent.z: is missing"));
   CHECK_THAT(refusal("double_pendulum/identify_inertia",
                      R"(bodies[1].inertia={"consistent": {"x": 1, "y": 1, "z": 1}, "xx": 1})"),
-             Contains("it stands alone"));
+             Contains("must be the only key"));
 }

@@ -122,7 +122,7 @@ TEST_CASE("design: too few iterations is a failure in words that keeps the best 
   CHECK_THAT(outcome.err, Contains("design failed: stopped at the limit of 1 iteration; ") && Contains(advice));
   CHECK_THAT(outcome.out, Contains("best point") && !Contains("optimum"));
   const CommandOutcome resumed = run_command({"resume", folder.file("out")});
-  CHECK_THAT(resumed.out, Contains("there is nothing to go on with: ") && Contains(advice));
+  CHECK_THAT(resumed.out, Contains("there is nothing to resume: ") && Contains(advice));
   const auto result = json_of(folder.path / "out/result.json");
   CHECK(result.at("status") == "failed");
   CHECK(result.at("optimizer").at("objective_final") <= result.at("optimizer").at("objective_initial"));

@@ -267,7 +267,7 @@ TEST_CASE("MJCF joints in a frame are placed by it", "[import]") {
   CHECK(body("<frame euler='30 0 0'><freejoint/></frame>").joints == 1);
   CHECK_THAT(finding_of("<mujoco><worldbody><body><joint/><frame><inertial mass='1' pos='0 0 0'/></frame></body>"
                         "</worldbody></mujoco>"),
-             Contains("inertial: stands in a <frame>"));
+             Contains("inertial: is in a <frame>"));
 }
 
 TEST_CASE("resistance of a joint that a problem file lacks is listed, also that of a class", "[import]") {
@@ -314,7 +314,7 @@ TEST_CASE("an orientation of an MJCF element goes before that of its class", "[i
   CHECK(turned != box("", ""));
   CHECK_THAT(finding_of("<mujoco><default><geom fromto='0 0 0 0 0 1'/></default><worldbody><body><joint/>"
                         "<geom type='capsule' size='0.1' pos='1 0 0'/></body></worldbody></mujoco>"),
-             Contains("geom: pos: must not stand beside fromto"));
+             Contains("geom: pos: must not be given with fromto"));
 }
 
 TEST_CASE("words of MuJoCo's options are those that it takes", "[import]") {

@@ -234,7 +234,7 @@ TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
     CHECK(fs::exists(out / kJournalFile) == keep);
     outcome = run_command({"resume", out.string()});
     CHECK(outcome.exit_code == kDone);
-    CHECK_THAT(outcome.out, Contains("its 'design' came to its end (ok)"));
+    CHECK_THAT(outcome.out, Contains("its 'design' is finished (ok)"));
   }
   // A journal that ends, beside results of a run that does not, goes on.
   auto running = json_of(out / "result.json");

@@ -430,7 +430,7 @@ TEST_CASE("a run of CVODES can be stopped, forward and on the way back", "[cvode
   RunOptions late{nullptr, [&](double t) { return t < 1.5 || ++at_end < 3; }};
   const SimulationResult back = simulate_adjoint(m, settings, costs, late);
   CHECK(back.status == SimulationStatus::stopped);
-  CHECK_THAT(back.message, Contains("on the way back"));
+  CHECK_THAT(back.message, Contains("in the backward run"));
 }
 
 TEST_CASE("with_cvodes keeps what a file asks for", "[cvodes]") {

@@ -96,7 +96,7 @@ TEST_CASE("an adjoint run is stopped on its way back, too", "[simulation]") {
                                                                                     return on_the_way_back < 2;
                                                                                   }});
   CHECK(run.status == SimulationStatus::stopped);
-  CHECK(run.message.find("on the way back") != std::string::npos);
+  CHECK(run.message.find("in the backward run") != std::string::npos);
   CHECK(on_the_way_back == 2);
 }
 

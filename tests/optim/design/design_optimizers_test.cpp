@@ -202,11 +202,11 @@ TEST_CASE("what an optimiser cannot do is said where it is asked for", "[design_
   CHECK_THAT(issue(), Contains("design.optimizer.seed: ") && Contains("draws no random numbers"));
   problem.design->optimizer.seed.reset();
   problem.design->optimizer.hessian = "exact";
-  CHECK_THAT(issue(), Contains("design.optimizer.hessian: is of ipopt only"));
+  CHECK_THAT(issue(), Contains("design.optimizer.hessian: is for ipopt only"));
   problem.design->optimizer.hessian = "lbfgs", problem.design->optimizer.lbfgs_history = 5;
   CHECK_THAT(issue(), Contains("design.optimizer.lbfgs_history: is given, but 'slsqp' keeps no pairs"));
   problem.design->optimizer.lbfgs_history.reset(), problem.design->optimizer.warm_start = true;
-  CHECK_THAT(issue(), Contains("design.optimizer.warm_start: is of ipopt only") && Contains("slsqp"));
+  CHECK_THAT(issue(), Contains("design.optimizer.warm_start: is for ipopt only") && Contains("slsqp"));
   problem.design->optimizer = {};
   problem.design->multistart.emplace();
   CHECK_THAT(issue(), Contains("parameters.L02: has no upper bound") && Contains("design.multistart"));

@@ -175,7 +175,8 @@ TEST_CASE("the gradients of all kinds agree with each other and with differences
 TEST_CASE("an objective that stands alone is refused beside other parts", "[objective]") {
   ObjectiveSpec spec = maximum("x", 10);
   spec.name = "mixed", spec.terminal = f("x");
-  CHECK_THROWS_WITH(Objective(oscillator(), spec), Catch::Contains("objectives.mixed.maximum_of: stands alone"));
+  CHECK_THROWS_WITH(Objective(oscillator(), spec),
+                    Catch::Contains("objectives.mixed.maximum_of: must be the only part"));
 }
 
 TEST_CASE("a true extreme is a value that is reached, also of what the steps do not resolve", "[objective]") {

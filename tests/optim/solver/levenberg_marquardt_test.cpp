@@ -185,7 +185,7 @@ TEST_CASE("residuals whose squares are no numbers are refused at the start, in w
   const LeastSquaresResult result = solve_least_squares(problem, Eigen::VectorXd::Ones(1));
   CHECK(result.status == SolverStatus::failed);
   CHECK_THAT(result.message,
-             Catch::Contains("the largest residual is 1e+") && Catch::Contains("in the data, and at sigma"));
+             Catch::Contains("the largest residual is 1e+") && Catch::Contains("in the data, and check sigma"));
 }
 
 TEST_CASE("the search stops on request and at the limit", "[least_squares]") {
