@@ -27,6 +27,11 @@ struct AxisRange {
   double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
   void include(double value) { low = std::min(low, value), high = std::max(high, value); }
   double span() const { return high - low; }
+  // The digits that resolve a millionth of the range: more than six of values that hardly differ.
+  int digits() const {
+    const double size = std::max(std::abs(low), std::abs(high));
+    return std::clamp(6 + static_cast<int>(std::floor(std::log10(size / span()))), 6, 15);
+  }
   // Ensures a range of nonzero length, with a little space at both ends.
   void finish(double air) {
     if (low > high) low = 0, high = 1;
@@ -292,9 +297,9 @@ std::string power_of_ten(double value) {
 // Positions on an axis (logarithms if it is logarithmic) and their labels.
 using Ticks = std::vector<std::pair<double, std::string>>;
 
-Ticks ticks_of(const std::vector<double>& values) {
+Ticks ticks_of(const std::vector<double>& values, const AxisRange& range) {
   Ticks ticks;
-  for (const double value : values) ticks.emplace_back(value, fmt::format("{:.6g}", value));
+  for (const double value : values) ticks.emplace_back(value, fmt::format("{:.{}g}", value, range.digits()));
   return ticks;
 }
 
@@ -308,7 +313,7 @@ Ticks logarithmic_ticks_of(const AxisRange& range, int count) {
 
 Ticks y_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
   if (plot.logarithmic_y) return logarithmic_ticks_of(frame.y, 6);
-  return ticks_of(round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6));
+  return ticks_of(round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6), frame.y);
 }
 
 Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
@@ -319,7 +324,7 @@ Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
   if (plot.logarithmic_x) return logarithmic_ticks_of(frame.x, 8);
   std::vector<double> values = round_ticks(frame.x.low, frame.x.high, 8);
   if (plot.whole_x) std::erase_if(values, [](double x) { return x != std::round(x); });
-  return ticks_of(values);
+  return ticks_of(values, frame.x);
 }
 
 // Draws the key in the style of the series.
@@ -433,7 +438,8 @@ std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
     for (const std::size_t i : visible_samples(plot, s, frame)) x.push_back(s.x[i]), y.push_back(s.y[i]);
     series.push_back(fmt::format(R"({{"name":{},"mark":"{}","part":{},"x":{},"y":{}}})", json_quoted(s.name),
                                  kMarks[static_cast<int>(s.mark)], s.part_of ? static_cast<long>(*s.part_of) : -1,
-                                 arrays.add(x, kTimeDigits), arrays.add(y)));
+                                 arrays.add(x, std::max(kTimeDigits, frame.x.digits())),
+                                 arrays.add(y, frame.y.digits())));
   }
   for (const PlotLimit& limit : plot.limits)
     limits.push_back(

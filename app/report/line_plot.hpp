@@ -58,7 +58,7 @@ inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of
 std::string to_svg(const LinePlot& plot);
 
 class PageArrays;
-// The data of the plot as JSON, for the page's script: the samples in to_svg, with six digits.
+// The data of the plot as JSON, for the page's script: the samples in to_svg, with six digits of the range.
 std::string plot_data(const LinePlot& plot, PageArrays& arrays);
 
 // About `count` round numbers (1, 2 or 5 times a power of ten) that cover [low, high].

@@ -231,8 +231,9 @@ class Plot {
 
   // Pairs of a place on the axis and the parts of its label.
   ticks(range, logarithmic, count) {
-    const size = Math.max(...range.map(Math.abs)), plain = v => Number(v.toPrecision(6)) || 0;
-    const label = v => size >= 1e5 || size < 1e-3 ? Number(plain(v).toPrecision(4)).toExponential() : String(plain(v));
+    const size = Math.max(...range.map(Math.abs)), hidden = Math.floor(Math.log10(size / (range[1] - range[0])));
+    const rounded = (v, digits) => Number(v.toPrecision(Math.min(digits + Math.max(hidden, 0), 15))) || 0;
+    const label = v => size >= 1e5 || size < 1e-3 ? rounded(v, 4).toExponential() : String(rounded(v, 6));
     if (!logarithmic) return round_ticks(...range, count).map(v => [v, [v ? label(v) : "0"]]);
     const values = logarithmic_ticks(10 ** range[0], 10 ** range[1], count);
     const near_one = values.every(v => v > 0.9e-3 && v < 1.1e4);

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "app/report/page_arrays.hpp"
+
 using namespace mbsopt;
 
 namespace {
@@ -142,6 +144,17 @@ TEST_CASE("a line of many samples is drawn where they are", "[report]") {
     largest = std::max({largest, std::abs(points[i].x - x), std::abs(points[i].y - y)});
   }
   CHECK(largest < 0.06);  // rounded to tenths of a px
+}
+
+TEST_CASE("values that differ little beside their size stay apart in the page's data and on the axis", "[report]") {
+  LinePlot plot{.title = "", .x_label = "", .y_label = ""};
+  plot.series.push_back({"far", {0, 1, 2}, {5000.0001, 5000.0002, 5000.0003}, Mark::line});
+  PageArrays arrays;
+  plot_data(plot, arrays);
+  CHECK(arrays.text().find("[5000.0001,5000.0002,5000.0003]") != std::string::npos);
+  const std::string svg = to_svg(plot);
+  CHECK(svg.find(">5000.0001<") != std::string::npos);
+  CHECK(svg.find(">5000.0002<") != std::string::npos);
 }
 
 TEST_CASE("the frame cuts no point", "[report]") {
