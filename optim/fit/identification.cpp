@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <mutex>
 #include <stdexcept>
 #include <utility>
@@ -151,6 +152,7 @@ class Identification {
           "the model is wrong, or the fit ended in another minimum",
           beyond, counted(stack.samples(), "sample"), stack.loss.s()));
     doubt_sigmas();
+    if (!fit_.options.preflight) doubt_explanations();
     for (std::string& doubt : angle_doubts(fit_.scene, fit_.spec, fit_.data, stack, at_start, z))
       fit_.result.warnings.push_back(std::move(doubt));
   }
@@ -169,6 +171,33 @@ class Identification {
         "identification.sigma_is_known: residuals are {:.2g} sigma (rms), but standard errors and intervals rest on "
         "sigma. {}; without sigma_is_known they rest on the residuals",
         size, size > 1 ? "Sigma is too small, or the model is wrong" : "Sigma is too large"));
+  }
+
+  // Channels whose residuals are larger than sigma explains, and than what the mean of the measured values leaves. The
+  // windows of a record are one channel.
+  void doubt_explanations() {
+    constexpr double kFactor = 2;  // of sigma: a static channel is its mean and noise
+    struct Sums {
+      double n = 0, mean = 0, spread = 0, residual = 0, scaled = 0;  // sums of squares about the mean, of m - y, of z
+    };
+    std::map<std::string, Sums> channels;
+    for (const ResidualRow& row : fit_.result.residuals) {
+      const ExperimentFit& experiment = fit_.result.experiments[row.experiment];
+      if (experiment.validate) continue;
+      Sums& s = channels[experiment.channels[row.channel].column];
+      const double from_mean = row.measured - s.mean;
+      s.mean += from_mean / ++s.n;
+      s.spread += from_mean * (row.measured - s.mean);  // Welford
+      s.residual += (row.measured - row.model) * (row.measured - row.model);
+      s.scaled += row.scaled * row.scaled;
+    }
+    for (const auto& [column, s] : channels) {
+      if (s.residual <= s.spread || s.scaled <= kFactor * kFactor * s.n) continue;
+      fit_.result.warnings.push_back(fmt::format(
+          "the fit explains nothing of '{}': its residuals are {:.3g} (rms), the measured values differ from their own "
+          "mean by {:.3g} (rms). A unit or the model is wrong, or the fit ended in another minimum: start elsewhere",
+          column, std::sqrt(s.residual / s.n), std::sqrt(s.spread / s.n)));
+    }
   }
 
   void order_residuals() {

@@ -183,6 +183,20 @@ TEST_CASE("residuals that known sigmas do not explain are a warning", "[identifi
   CHECK_THAT(warned(4 * kSigma, true), Contains("residuals are 0.2") && Contains("Sigma is too large"));
 }
 
+TEST_CASE("a fit that explains less than a mean does is a warning", "[identification]") {
+  const auto warned = [](double scale) {
+    Problem p = fit_problem();
+    CsvTable measured = noisy(3);
+    for (double& value : measured.columns[1]) value *= scale;  // a unit that the header does not say
+    const IdentificationResult result = run_identification(p, {measured});
+    return std::ranges::any_of(result.warnings, [](const std::string& warning) {
+      return warning.find("the fit explains nothing of") != std::string::npos;
+    });
+  };
+  CHECK_FALSE(warned(1));
+  CHECK(warned(1e3));
+}
+
 TEST_CASE("a prior decides what the data leave open, for each free value by itself", "[identification][prior]") {
   Problem p = fit_problem(64, 0.055);
   testing::add_parameters(p.scene, {{"m_arm", 0.4}});
