@@ -75,7 +75,8 @@ std::vector<std::string> data_files(const Problem& problem, const NamedTerms& te
 Run::Run(const CommandContext& given)
     : problem_(problem_of(given, reader_warnings_)),
       context(given),
-      folder(given.options.out, problem.scene.name, given.options.problem_file, given.command),
+      folder(given.options.out, problem.scene.name, given.options.problem_file,
+             given.options.preflight ? "preflight" : given.command),  // it replaces no fit
       progress(given.err, given.err_is_terminal, given.options.quiet) {
   result["program"] = "mbsopt";
   result["version"] = program_version();

@@ -322,3 +322,16 @@ TEST_CASE("identify --compare: the other file is checked before the fit, and fou
                                               "identification.optimizer.tolerance=1e-9", "--out", folder.file("pre")});
   CHECK_THAT(skipped.err, Contains("--compare: is skipped by --preflight") && Contains("--set does not change"));
 }
+
+TEST_CASE("identify --preflight does not replace the result of a fit", "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  REQUIRE(run_command({"identify", file, "--out", folder.file("out")}).exit_code == kDone);
+  const std::string fit = content_of(folder.path / "out/result.json");
+  const CommandOutcome refused = run_command({"identify", file, "--preflight", "--out", folder.file("out")});
+  CHECK(refused.exit_code == kBadInput);
+  CHECK_THAT(refused.err, Contains("holds the outcome of 'identify', which 'preflight' would overwrite"));
+  CHECK(content_of(folder.path / "out/result.json") == fit);
+  CHECK(run_command({"identify", file, "--out", folder.file("out")}).exit_code == kDone);
+}
