@@ -46,7 +46,11 @@ std::string did_you_mean(std::string_view word, const std::vector<std::string>& 
       nearest = &candidate;
     }
   }
-  // A one-letter name with a wrong letter is another name.
+  // A one-letter name with a wrong letter is another name, and 'maximize' is the opposite of 'minimize'.
+  const auto opposites = [](std::string_view a, std::string_view b) {
+    return a.starts_with("max") && b.starts_with("min");
+  };
+  if (nearest != nullptr && (opposites(word, *nearest) || opposites(*nearest, word))) return "";
   if (nearest == nullptr || best > allowed || best >= std::max(word.size(), nearest->size())) return "";
   return " (did you mean '" + *nearest + "'?)";
 }

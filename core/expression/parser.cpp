@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "core/expression/did_you_mean.hpp"
+#include "core/expression/dimension.hpp"
 #include "core/expression/expression.hpp"
 #include "core/expression/syntax_tree.hpp"
 
@@ -51,7 +52,7 @@ class Parser {
     skip_space();
     if (at_end()) fail("is empty, an expression is expected", 0);
     sum();
-    if (!at_end()) fail("expected an operator (+ - * / ^) before " + found() + decimal_comma(), at_);
+    if (!at_end()) fail("expected an operator (+ - * / ^) before " + found() + decimal_comma() + brackets(), at_);
     return std::move(nodes_);
   }
 
@@ -133,7 +134,7 @@ class Parser {
       fail("the number " + std::string(literal) + " is out of the range of double precision", offset);
     at_ += literal.size();
     if (!at_end() && (is_letter(text_[at_]) || text_[at_] == '.'))
-      fail("expected an operator after the number " + std::string(literal) + ", found " + found(), at_);
+      fail("expected an operator after the number " + std::string(literal) + ", found " + found() + brackets(), at_);
     skip_space();
     if (peek() == '[') unit(node);
     nodes_.push_back(std::move(node));
@@ -351,6 +352,16 @@ class Parser {
   std::string decimal_comma() const {
     const bool inside = at_ > 0 && at_ + 1 < text_.size() && is_digit(text_[at_ - 1]) && is_digit(text_[at_ + 1]);
     return text_[at_] == ',' && inside ? "; decimals have a point" : "";
+  }
+
+  // A unit that stands behind a number without its brackets.
+  std::string brackets() const {
+    std::size_t before = at_, end = at_;
+    while (before > 0 && text_[before - 1] == ' ') --before;
+    while (end < text_.size() && is_letter(text_[end])) ++end;
+    const std::string word(text_.substr(at_, end - at_));
+    const bool behind_number = before > 0 && (is_digit(text_[before - 1]) || text_[before - 1] == '.');
+    return behind_number && parse_unit(word) ? "; a unit stands in brackets: [" + word + "]" : "";
   }
 
   std::string found() const {

@@ -158,8 +158,9 @@ void check_meaning(Checker& checker, const Parameter& parameter) {
                                             known_units());
   else if (unit->to_si != 1)
     checker.issue(checker.path("unit"), "'" + parameter.unit + "' is not SI, and values are; give the unit as '" +
-                                            to_string(unit->dimension) + "', or the value as \"" + text_of(value) +
-                                            " [" + parameter.unit + "]\" without \"unit\"");
+                                            to_string(unit->dimension) +
+                                            "', or write it behind the value, as in \"1 [" + parameter.unit +
+                                            "]\", without \"unit\"");
 }
 
 void check_meaning(Checker& checker, const Body& body) {

@@ -143,13 +143,14 @@ void describe(auto& v, Like<CaseSpec> auto& c) {
 }
 
 void describe(auto& v, Like<DesignSpec> auto& d) {
-  v.reference_or(
-      "minimize", d.minimize, To::objective, {"the objective to minimise", Need::required}, [&](auto& inside) {
-        inside.word("over", d.over, Words{"sum max"}, {"sum or maximum of its weighted values in the load cases"});
-        inside.plain("sharpness", d.sharpness, kPositive,
-                     {"of max: k in log(sum exp(k x))/k [1/unit of the objective]; when absent 100 over the "
-                      "largest at the start"});
-      });
+  v.reference_or("minimize", d.minimize, To::objective,
+                 {"the objective to minimise; to maximise f, one that is -f", Need::required}, [&](auto& inside) {
+                   inside.word("over", d.over, Words{"sum max"},
+                               {"sum or maximum of its weighted values in the load cases"});
+                   inside.plain("sharpness", d.sharpness, kPositive,
+                                {"of max: k in log(sum exp(k x))/k [1/unit of the objective]; when absent 100 over the "
+                                 "largest at the start"});
+                 });
   v.list("subject_to", d.subject_to, {"bounds on objectives; those of extremes hold for the true ones"});
   v.references("variables", d.variables, To::parameter, {"parameters that may change", Need::required});
   v.object("optimizer", d.optimizer, {"how it is minimised"});

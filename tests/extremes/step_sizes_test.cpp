@@ -57,7 +57,7 @@ TEST_CASE("a run so long that its times could not be told from each other says s
 TEST_CASE("steps, tolerances and rows that no run gets through are refused with their place in the file",
           "[extremes]") {
   const auto [key, value, words] = GENERATE(table<std::string, double, std::string>(
-      {{"integrator.step", 1e-300, "more steps to the end than max_steps, 1e+07, allows; take a longer step"},
+      {{"integrator.step", 1e-300, "the run would need more steps than max_steps, 1e+07, allows; take a longer step"},
        {"integrator.step", 0, "greater than 0"},
        {"integrator.rtol", 1e300, "a relative tolerance must be below 1"},
        {"integrator.rtol", 0, "greater than 0"},
