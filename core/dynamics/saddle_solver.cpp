@@ -19,6 +19,14 @@ void reduce(double c, const Eigen::VectorXd& alpha, Y& z) {
   for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(z)[r] *= 1 - c * alpha(r);
 }
 
+// Takes back the last pass, which added correction to x and -alpha residual to nu.
+template <class X, class Y>
+void take_back(const Eigen::VectorXd& alpha, std::vector<X>& x, Y& nu, const Y& residual,
+               const std::vector<X>& correction) {
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] -= correction[i];
+  for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(nu)[r] += alpha(r) * entries(residual)[r];
+}
+
 // A residual above this, relative as in Settings, is more than rounding.
 constexpr double kDisagreement = 1e-14;
 
@@ -49,18 +57,19 @@ void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, con
   const SaddleIterate at{alpha_.data(), b[0].data(),     x[0].data(),
                          nu.data(),     residual.data(), static_cast<std::size_t>(alpha_.size())};
   const double size_of_g = g.cwiseAbs().maxCoeff();
-  refine(at, true, size_of_g, settings, residual, correction);
+  refine(at, true, size_of_g, settings, x, nu, residual, correction);
   if (c_ > 0 && residual_ratio_ > kDisagreement) {
     nu -= residual / c_;
     residual.setZero();
-    refine(at, false, size_of_g, settings, residual, correction);
+    refine(at, false, size_of_g, settings, x, nu, residual, correction);
   }
 }
 
 template <class Rows>
 template <class X, class Y>
 void BlockSaddleSolver<Rows>::refine(const SaddleIterate& at, bool from_zero, double size_of_g,
-                                     const Settings& settings, Y& residual, std::vector<X>& correction) {
+                                     const Settings& settings, std::vector<X>& x, Y& nu, Y& residual,
+                                     std::vector<X>& correction) {
   double before = INFINITY;
   for (int k = 0;; ++k) {
     const bool first = from_zero && k == 0, last = k >= settings.most, decides = last || k + 1 >= settings.least;
@@ -77,7 +86,11 @@ void BlockSaddleSolver<Rows>::refine(const SaddleIterate& at, bool from_zero, do
       residual_size_ = now;
       const double tolerance = now > kSlow * before ? std::min(settings.tolerance, kRounding) : settings.tolerance;
       if (residual_ratio_ <= tolerance) return;
-      if (last || !(now < kStagnation * before)) return;
+      if (!(now < kStagnation * before)) {
+        if (c_ == 0 && k > settings.least) take_back(alpha_, x, nu, residual, correction);
+        return;
+      }
+      if (last) return;
     }
     before = now;
   }

@@ -77,8 +77,8 @@ class BlockSaddleSolver {
   void solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu, Y& residual,
                  std::vector<X>& correction);
   template <class X, class Y>
-  void refine(const SaddleIterate& at, bool from_zero, double size_of_g, const Settings& settings, Y& residual,
-              std::vector<X>& correction);
+  void refine(const SaddleIterate& at, bool from_zero, double size_of_g, const Settings& settings, std::vector<X>& x,
+              Y& nu, Y& residual, std::vector<X>& correction);
 
   Rows rows_;
   BlockCholesky<kUnknowns> S_;
