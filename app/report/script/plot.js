@@ -263,7 +263,8 @@ class Plot {
     if (names.length) this.thin_names(group);
     for (const [v, words] of this.ticks(this.y, this.plot.logy, height > 220 ? 6 : 5)) {
       const y = this.py(v);
-      add(`M${left} ${y.toFixed(1)}h${width}`, {x: left - 6, y: (y + 4).toFixed(1), "text-anchor": "end"}, words);
+      const fit = words[0].length > 9 ? {textLength: left - 8, lengthAdjust: "spacingAndGlyphs"} : {};
+      add(`M${left} ${y.toFixed(1)}h${width}`, {x: left - 6, y: (y + 4).toFixed(1), "text-anchor": "end", ...fit}, words);
     }
   }
 
