@@ -264,7 +264,8 @@ class Plot {
     for (const [v, words] of this.ticks(this.y, this.plot.logy, height > 220 ? 6 : 5)) {
       const y = this.py(v);
       const fit = words[0].length > 9 ? {textLength: left - 8, lengthAdjust: "spacingAndGlyphs"} : {};
-      add(`M${left} ${y.toFixed(1)}h${width}`, {x: left - 6, y: (y + 4).toFixed(1), "text-anchor": "end", ...fit}, words);
+      const place = {x: left - 6, y: (y + 4).toFixed(1), "text-anchor": "end", ...fit};
+      add(`M${left} ${y.toFixed(1)}h${width}`, place, words);
     }
   }
 
