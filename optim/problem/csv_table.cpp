@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <new>
 #include <unordered_set>
 
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
+#include "core/expression/dimension.hpp"
 #include "optim/problem/regular_file.hpp"
 
 namespace mbsopt {
@@ -38,24 +40,32 @@ class Reader {
  public:
   Reader(std::string_view text, CsvTable& table) : rest_(text), table_(table) {
     if (rest_.substr(0, 3) == "\xEF\xBB\xBF") rest_.remove_prefix(3);
+    const std::string_view mark = rest_.substr(0, 2);
+    if (mark == "\xFF\xFE" || mark == "\xFE\xFF" ||
+        rest_.substr(0, rest_.find('\n')).find('\0') != std::string_view::npos)
+      throw CsvError(table_.name + ": is text of 16 or more bits per character (UTF-16); save it as UTF-8");
   }
 
   void read() {
     if (!next_line()) throw CsvError(table_.name + ": is empty; a header row with the columns' names is needed");
     find_delimiter();
     read_header();
-    while (next_line()) read_row();
+    if (!next_line() || (split(), read_units() && !next_line())) return;
+    do {
+      split();
+      read_row();
+    } while (next_line());
   }
 
  private:
   // Reads the next line that is neither blank nor a comment.
   bool next_line() {
     while (!rest_.empty()) {
-      const std::size_t end = std::min(rest_.find('\n'), rest_.size());
+      const std::size_t end = std::min(rest_.find_first_of("\r\n"), rest_.size());
+      const std::size_t ends = rest_.substr(end, 2) == "\r\n" ? 2 : 1;
       current_ = rest_.substr(0, end);
-      rest_.remove_prefix(std::min(end + 1, rest_.size()));
+      rest_.remove_prefix(std::min(end + ends, rest_.size()));
       ++line_;
-      while (!current_.empty() && current_.back() == '\r') current_.remove_suffix(1);
       const std::string_view content = trimmed(current_);
       if (!content.empty() && content.front() != '#') return true;
     }
@@ -117,25 +127,49 @@ class Reader {
     split();
     std::unordered_set<std::string> seen;
     for (const Cell& cell : cells_) {
-      if (cell.text.empty()) fail(cell.column, "a column without a name in the header");
-      if (!seen.insert(cell.text).second) fail(cell.column, "the column '" + cell.text + "' appears twice");
+      if (!cell.text.empty() && !seen.insert(cell.text).second)
+        fail(cell.column, "the column '" + cell.text + "' appears twice");
       table_.header.push_back(cell.text);
     }
-    double number = 0;
-    if (std::all_of(cells_.begin(), cells_.end(),
-                    [&](const Cell& c) { return is_number(c.text, number) || is_decimal_comma(c.text); }))
+    if (std::ranges::all_of(cells_, looks_like_number))
       fail(1, "the first row must hold the columns' names, found numbers");
     table_.columns.resize(table_.header.size());
+    table_.faults.resize(table_.header.size());
   }
 
+  // Reads a row of units below the names, and puts each unit behind its name. Returns whether there is such a row.
+  bool read_units() {
+    const auto is_text = [](const Cell& c) { return !looks_like_number(c) && !is_missing(c.text); };
+    const auto is_empty = [](const Cell& c) { return c.text.empty(); };
+    const auto is_text_or_empty = [&](const Cell& c) { return is_text(c) || is_empty(c); };
+    if (!std::ranges::all_of(cells_, is_text_or_empty) || std::ranges::all_of(cells_, is_empty)) return false;
+    for (std::size_t k = 0; k < std::min(cells_.size(), table_.header.size()); ++k) {
+      std::string_view unit = cells_[k].text;
+      if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
+      if (unit.empty() || unit == "-") continue;
+      if (!parse_unit(unit))
+        fail(cells_[k].column,
+             fmt::format("the row below the names has no numbers, and '{}' is no known unit; a '#' in front of the row "
+                         "leaves it out",
+                         cells_[k].text));
+      std::string& name = table_.header[k];
+      if (!name.empty() && !parts_of_header(name).unit) name += fmt::format(" [{}]", unit);
+    }
+    return true;
+  }
+
+  // Empty cells may stand behind the last named column, in the header or in the rows.
   void read_row() {
-    split();
+    std::size_t named = table_.header.size();
+    while (named > 0 && table_.header[named - 1].empty()) --named;
+    while (cells_.size() > table_.header.size() && cells_.back().text.empty()) cells_.pop_back();
+    while (cells_.size() < table_.header.size() && cells_.size() >= named) cells_.emplace_back();
     if (cells_.size() != table_.header.size())
       fail(1, fmt::format("the row has {}, the header {}{}", counted(cells_.size(), "cell"), table_.header.size(),
                           delimiter_ == ',' && cells_.size() > table_.header.size()
                               ? " (where decimals have a comma, cells need a semicolon or a tab between them)"
                               : ""));
-    for (std::size_t k = 0; k < cells_.size(); ++k) table_.columns[k].push_back(number(cells_[k], table_.header[k]));
+    for (std::size_t k = 0; k < cells_.size(); ++k) table_.columns[k].push_back(number(cells_[k], k));
     table_.lines.push_back(line_);
   }
 
@@ -145,40 +179,53 @@ class Reader {
     return error == std::errc() && end == text.data() + text.size() && !text.empty();
   }
 
-  // Returns whether a text such as "1,5" is a number with a decimal comma.
-  static bool is_decimal_comma(std::string text) {
+  // Returns whether a cell is a number, with a decimal comma too, or empty.
+  static bool looks_like_number(const Cell& cell) {
+    std::string text = cell.text;
     std::replace(text.begin(), text.end(), ',', '.');
     double number = 0;
-    return is_number(text, number);
+    return text.empty() || is_number(text, number);
   }
 
+  // An empty cell, and the words of programs for "no number": nan, -nan, nan(ind), NA.
+  static bool is_missing(std::string_view text) {
+    if (!text.empty() && (text.front() == '-' || text.front() == '+')) text.remove_prefix(1);
+    const std::string word = lower_case(text);
+    return word.empty() || word == "nan" || word == "na" || word == "n/a" || word.starts_with("nan(");
+  }
+
+  // The number of a cell, or NaN. A column keeps its first fault, which matters only if the column is used.
+  double number(const Cell& cell, std::size_t k) {
+    if (table_.faults[k].empty() && !is_missing(cell.text)) {
+      try {
+        return number(cell, table_.header[k]);
+      } catch (const CsvError& error) {
+        table_.faults[k] = error.what();
+      }
+    }
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+
+  // The first point or comma between digits decides for all numbers of the file.
   double number(const Cell& cell, const std::string& column) {
-    const std::string word = lower_case(cell.text);
-    if (word.empty() || word == "nan" || word == "na") return std::numeric_limits<double>::quiet_NaN();
-    double value = 0;
-    if (is_number(with_point(cell, column), value) && std::isfinite(value)) return value;
-    fail(cell.column, fmt::format("column '{}': '{}' is not a finite number", column, cell.text));
-  }
-
-  // The cell's text with a decimal point. The first point or comma of the file decides for all others.
-  std::string with_point(const Cell& cell, const std::string& column) {
-    const std::size_t mark = cell.text.find_first_of(".,");
-    if (mark == std::string::npos) return cell.text;
-    const char found = cell.text[mark];
     const auto refuse = [&](const std::string& why) {
       fail(cell.column, fmt::format("column '{}': '{}' {}", column, cell.text, why));
     };
-    if (cell.text.find_first_of(".,", mark + 1) != std::string::npos)
+    std::string text = cell.text;
+    const std::size_t mark = text.find_first_of(".,");
+    if (mark != std::string::npos && text.find_first_of(".,", mark + 1) != std::string::npos)
       refuse("has more than one point or comma; thousands are not separated");
+    const char found = mark == std::string::npos ? '\0' : text[mark];
+    if (found) text[mark] = '.';
+    double value = 0;
+    if (!is_number(text, value) || !std::isfinite(value)) refuse("is not a finite number");
     if (found == ',' && delimiter_ == ',')
       refuse("has a decimal comma, which needs a semicolon or a tab between cells");
-    if (decimal_ == 0) decimal_ = found, decimal_line_ = line_;
-    if (decimal_ != found)
+    if (found && decimal_ == 0) decimal_ = found, decimal_line_ = line_;
+    if (found && decimal_ != found)
       refuse(fmt::format("has a decimal {}, line {} a decimal {}; a file has one of them", name_of(found),
                          decimal_line_, name_of(decimal_)));
-    std::string text = cell.text;
-    text[mark] = '.';
-    return text;
+    return value;
   }
 
   static const char* name_of(char decimal) { return decimal == ',' ? "comma" : "point"; }
@@ -199,9 +246,13 @@ class Reader {
 }  // namespace
 
 ColumnHeader parts_of_header(std::string_view header) {
-  const std::size_t opening = header.rfind('[');
-  if (opening == std::string_view::npos || header.back() != ']') return {header, std::nullopt};
-  return {trimmed(header.substr(0, opening)), trimmed(header.substr(opening + 1, header.size() - opening - 2))};
+  for (const std::string_view brackets : {"[]", "()"}) {
+    const std::size_t opening = header.rfind(brackets[0]);
+    if (opening == std::string_view::npos || header.back() != brackets[1]) continue;
+    const std::string_view unit = trimmed(header.substr(opening + 1, header.size() - opening - 2));
+    if (brackets[0] == '[' || parse_unit(unit)) return {trimmed(header.substr(0, opening)), unit};
+  }
+  return {header, std::nullopt};
 }
 
 std::string CsvTable::place(std::size_t row) const {
@@ -209,6 +260,7 @@ std::string CsvTable::place(std::size_t row) const {
 }
 
 std::size_t CsvTable::find_column(std::string_view column_name) const {
+  if (column_name.empty()) return header.size();
   const auto exact = std::find(header.begin(), header.end(), column_name);
   if (exact != header.end()) return static_cast<std::size_t>(exact - header.begin());
   const auto is_named = [&](const std::string& text) { return parts_of_header(text).name == column_name; };
@@ -220,11 +272,14 @@ std::size_t CsvTable::find_column(std::string_view column_name) const {
 const std::vector<double>& CsvTable::column(std::string_view column_name) const {
   const std::size_t found = find_column(column_name);
   if (found == header.size()) {
-    std::vector<std::string> names = header;
-    for (const std::string& text : header) names.emplace_back(parts_of_header(text).name);
+    std::vector<std::string> named = header;
+    std::erase(named, "");
+    std::vector<std::string> names = named;
+    for (const std::string& text : named) names.emplace_back(parts_of_header(text).name);
     throw CsvError(fmt::format("{}: has no column '{}'{}; its columns: {}", name, column_name,
-                               did_you_mean(column_name, names), joined(header)));
+                               did_you_mean(column_name, names), joined(named)));
   }
+  if (found < faults.size() && !faults[found].empty()) throw CsvError(faults[found]);
   return columns[found];
 }
 
@@ -240,6 +295,8 @@ CsvTable read_csv(const std::string& path) {
     return parse_csv(content_of_regular_file(path), path);
   } catch (const FileError& error) {
     throw CsvError(path + ": " + error.what());
+  } catch (const std::bad_alloc&) {
+    throw CsvError(path + ": is too large for the memory of this machine");
   }
 }
 
