@@ -10,6 +10,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <set>
 #include <span>
 #include <stdexcept>
 #include <system_error>
@@ -399,10 +400,10 @@ class Parser {
 }  // namespace
 
 void complete(SyntaxTree& tree) {
+  std::set<std::string_view> names;
   for (const SyntaxNode& node : tree.nodes)
-    if (node.operation == Operation::name) tree.names.push_back(node.name);
-  std::sort(tree.names.begin(), tree.names.end());
-  tree.names.erase(std::unique(tree.names.begin(), tree.names.end()), tree.names.end());
+    if (node.operation == Operation::name) names.insert(node.name);
+  tree.names.assign(names.begin(), names.end());
   if (tree.names.empty()) tree.number = values_of(tree.nodes).back();
 }
 

@@ -44,6 +44,8 @@ class Symbols {
   std::unordered_map<std::string, Expression> definitions_;
 };
 
+inline constexpr int kDeepestDefinitions = 500;  // definitions within each other: programs are built by recursion
+
 // A name that the table does not hold, or a definition that refers to itself (directly or through others).
 class UnknownName : public std::runtime_error {
  public:

@@ -38,7 +38,6 @@ class ProgramBuilder {
 
  private:
   using Instruction = Program::Instruction;
-  static constexpr int kDeepestDefinitions = 500;
 
   int emit(const Expression& expression) {
     const std::vector<SyntaxNode>& nodes = expression.tree().nodes;

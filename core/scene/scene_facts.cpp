@@ -1,7 +1,10 @@
 #include "core/scene/scene_facts.hpp"
 
 #include <algorithm>
+#include <boost/graph/adjacency_list.hpp>
+#include <boost/graph/strong_components.hpp>
 #include <cmath>
+#include <numeric>
 
 #include "core/scene/scene_path.hpp"
 #include "core/scene/signals.hpp"
@@ -47,11 +50,12 @@ SceneFacts::SceneFacts(const Scene& scene)
   for (const Parameter& parameter : scene.parameters) {
     if (none_.input(parameter.name) >= 0) continue;
     none_.add_input(parameter.name);
-    parameter_values_.push_back(parameter.value);
+    values_.push_back(parameter.value);
     any_unread_ = any_unread_ || std::isnan(parameter.value);
     const std::optional<Unit> unit = parse_unit(parameter.unit);
     dimensions_[parameter.name] = unit ? std::optional(unit->dimension) : std::nullopt;
   }
+  constants_ = none_;
   for (const Definition& definition : scene.definitions) {
     if (none_.input(definition.name) < 0 && !none_.definition(definition.name))
       none_.add_definition(definition.name, definition.value);
@@ -61,9 +65,10 @@ SceneFacts::SceneFacts(const Scene& scene)
     const std::optional<Unit> unit = parse_unit(signal.unit);
     dimensions_[signal.name] = unit && signal.gain.is_number() ? std::optional(unit->dimension) : std::nullopt;
   }
-  Broken definitions, expressions;
+  std::vector<Named> named;
   for (const auto& [name, value] : scene.definitions)
-    find_broken(child_path("definitions", name), name, value, none_, definitions);
+    if (is_identifier(name) && none_.definition(name))
+      named.push_back({child_path("definitions", name), name, &value, &none_});
   Symbols with_signals = none_;
   add_signals(with_signals, scene);
   tsda_law_ = rsda_law_ = time_law_ = objective_ = with_signals;
@@ -78,31 +83,59 @@ SceneFacts::SceneFacts(const Scene& scene)
       objective_.add_definition(sensor.name, sensor.value);
   }
   for (const Sensor& sensor : scene.sensors)
-    if (is_expression(sensor))
-      find_broken(child_path(child_path("sensors", sensor.name), "value"), sensor.name, sensor.value, objective_,
-                  expressions);
+    if (is_expression(sensor) && is_identifier(sensor.name) && objective_.definition(sensor.name))
+      named.push_back(
+          {child_path(child_path("sensors", sensor.name), "value"), sensor.name, &sensor.value, &objective_});
+  find_broken(named);
 }
 
-void SceneFacts::find_broken(const std::string& path, const std::string& name, const Expression& value,
-                             const Symbols& symbols, Broken& found) {
-  if (!is_identifier(name) || !symbols.definition(name)) return;
-  const std::vector<std::string>& names = value.names();
-  const auto nobody_knows = [&](const std::string& n) { return found.unknown.contains(n) || !knows(symbols, n); };
-  if (std::any_of(names.begin(), names.end(), nobody_knows)) {
-    found.unknown.insert(name), broken_.insert(name);
-    return;
+// The strong components of the graph "one name uses another", children first: names in a circle form one component.
+// Outside circles, the height of a name is one more than that of the highest one it uses.
+void SceneFacts::find_broken(const std::vector<Named>& all) {
+  std::unordered_map<std::string_view, std::size_t> index;
+  for (std::size_t i = 0; i < all.size(); ++i) index.emplace(all[i].name, i);
+  boost::adjacency_list<boost::vecS, boost::vecS, boost::directedS> uses(all.size());
+  std::vector<char> in_circle(all.size(), 0);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (const std::string& name : all[i].value->names()) {
+      const auto used = index.find(name);
+      if (used == index.end() || !knows(*all[i].symbols, name)) continue;
+      add_edge(i, used->second, uses);
+      in_circle[i] = in_circle[i] || used->second == i;
+    }
   }
-  try {
-    Program(Expression::parse(name), symbols);
-  } catch (const UnknownName& error) {
-    broken_.insert(name);
-    const bool of_definition = symbols.definition(error.name) != nullptr;  // else a name that nobody knows
-    const bool is_deep = of_definition && std::string_view(error.what()).find("deeper") != std::string_view::npos;
-    if (of_definition && (error.name == name || (is_deep && !found.too_deep)))
-      endless_.emplace_back(path, error.what());
-    found.too_deep = found.too_deep || is_deep;
-  } catch (const ExpressionError&) {  // called like a function: an issue of its own
+  std::vector<std::size_t> component(all.size()), order(all.size()), size(all.size(), 0);
+  boost::strong_components(uses, boost::make_iterator_property_map(component.begin(), get(boost::vertex_index, uses)));
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return component[i]; });
+  for (const std::size_t c : component) ++size[c];
+  std::vector<int> height(all.size(), 1);
+  bool any_too_deep = false;
+  for (const std::size_t i : order) {
+    const auto& [path, name, value, symbols] = all[i];
+    in_circle[i] = in_circle[i] || size[component[i]] > 1;
+    if (in_circle[i]) endless_.emplace_back(path, "'" + name + "' refers to itself");
+    bool broken = in_circle[i];
+    for (const std::string& used : value->names()) {
+      broken = broken || is_broken(used) || !knows(*symbols, used);
+      if (const auto it = index.find(used); it != index.end() && !broken)
+        height[i] = std::max(height[i], height[it->second] + 1);
+    }
+    if (!broken && height[i] > kDeepestDefinitions) {
+      if (!any_too_deep)
+        endless_.emplace_back(path, "definitions nest deeper than " + std::to_string(kDeepestDefinitions) + " levels");
+      broken = any_too_deep = true;
+    }
+    if (broken) broken_.insert(name);
+    if (broken || symbols != &none_ || constants_.input(name) >= 0) continue;
+    values_.push_back(value_at(Program(*value, constants_)));
+    constants_.add_input(name);
   }
+}
+
+double SceneFacts::value_at(const Program& program) const {
+  program.grow(scratch_);
+  return program.value(values_, scratch_);
 }
 
 const Body* SceneFacts::body(const std::string& name) const {
@@ -202,10 +235,9 @@ std::optional<double> SceneFacts::any_value(const Field& field) const {
   if (field.is_number()) return field.number();
   if (!can_be_evaluated(field, none_)) return std::nullopt;
   try {
-    const Program program(field, none_);
-    program.grow(scratch_);
-    const double result = program.value(parameter_values_, scratch_);
-    return std::isnan(result) && any_unread_ ? std::nullopt : std::optional(result);
+    const auto [it, is_new] = computed_.try_emplace(&field.tree(), 0.0);  // several checks ask for long expressions
+    if (is_new) it->second = value_at(Program(field, constants_));
+    return std::isnan(it->second) && any_unread_ ? std::nullopt : std::optional(it->second);
   } catch (const UnknownName&) {
     return std::nullopt;
   }
@@ -227,13 +259,31 @@ std::optional<std::array<double, 3>> SceneFacts::value(const PointField& field, 
   return it == owner->points.end() ? std::nullopt : value(it->second);
 }
 
+const SceneFacts::Scale& SceneFacts::scale() const {
+  if (scale_) return *scale_;
+  auto& [length, mass] = scale_.emplace();
+  const auto add = [&](const PointField& point, const std::string& owner) {
+    if (const auto x = value(point, owner)) length = std::max(length, std::hypot((*x)[0], (*x)[1], (*x)[2]));
+  };
+  for (const Body& body : scene_.bodies) {
+    mass = std::max(mass, value(body.mass).value_or(0));
+    add(body.position, ""), add(body.com, "");
+    for (const auto& [name, point] : body.points) add(point, "");
+  }
+  for (const Joint& joint : scene_.joints) add(joint.point1, joint.body1), add(joint.point2, joint.body2);
+  for (const Force& force : scene_.forces)
+    if (const auto* tsda = std::get_if<Tsda>(&force.kind))
+      add(tsda->point1, tsda->body1), add(tsda->point2, tsda->body2);
+  return *scale_;
+}
+
 std::optional<std::array<double, 3>> SceneFacts::law_at(const Expression& law, double t) const {
   if (any_unread_ || !can_be_evaluated(law, time_law_)) return std::nullopt;
   try {
     const Program f(law, time_law_), f_t = f.derivative(time_law_.input("t")),
                                      f_tt = f_t.derivative(time_law_.input("t"));
     for (const Program* program : {&f, &f_t, &f_tt}) program->grow(scratch_);
-    std::vector<double> inputs = parameter_values_;
+    std::vector<double> inputs(values_.begin(), values_.begin() + none_.inputs());
     inputs.push_back(t);
     return std::array{f.value(inputs, scratch_), f_t.value(inputs, scratch_), f_tt.value(inputs, scratch_)};
   } catch (const UnknownName&) {

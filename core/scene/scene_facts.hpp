@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -48,6 +49,12 @@ class SceneFacts {
   std::optional<std::array<double, 3>> value(const VectorField& field) const;
   std::optional<std::array<double, 3>> value(const PointField& field, const std::string& body) const;
 
+  struct Scale {
+    double length = 0;  // the largest distance of a point from the origin of its body or of the ground [m]
+    double mass = 0;    // the largest of a body [kg]
+  };
+  const Scale& scale() const;
+
   // A law of time alone and its first two derivatives; nullopt if it depends on more or cannot be evaluated.
   std::optional<std::array<double, 3>> law_at(const Expression& law, double t) const;
 
@@ -65,12 +72,13 @@ class SceneFacts {
                                                PlainNumbers plain = PlainNumbers::fit_everything) const;
 
  private:
-  struct Broken {
-    bool too_deep = false;
-    std::set<std::string> unknown;  // depend on names that nobody knows
+  struct Named {  // a definition or an expression sensor
+    std::string path, name;
+    const Expression* value;
+    const Symbols* symbols;
   };
-  void find_broken(const std::string& path, const std::string& name, const Expression& value, const Symbols& symbols,
-                   Broken& found);
+  void find_broken(const std::vector<Named>& all);  // and evaluates the other definitions
+  double value_at(const Program& program) const;    // of constants_
   // The program's names of an expression that can be evaluated; otherwise none.
   std::vector<std::string> used_names(const Expression& expression, const Symbols& symbols) const;
   bool can_be_evaluated(const Expression& expression, const Symbols& symbols) const;
@@ -83,11 +91,14 @@ class SceneFacts {
   std::map<std::string, const Sensor*> sensors_;
   std::vector<std::string> objectives_;
   Symbols none_, tsda_law_, rsda_law_, time_law_, objective_;
-  std::vector<double> parameter_values_;
+  Symbols constants_;           // parameters, then definitions, all of them inputs
+  std::vector<double> values_;  // of constants_
   bool any_unread_ = false;
   std::set<std::string> broken_;
   std::vector<std::pair<std::string, std::string>> endless_;
   mutable Program::Scratch scratch_;
+  mutable std::unordered_map<const SyntaxTree*, double> computed_;
+  mutable std::optional<Scale> scale_;
   mutable std::map<std::string, std::optional<Dimension>> dimensions_;
   mutable std::map<std::pair<std::string, PlainNumbers>, std::optional<Dimension>> dimensions_of_sensors_;
 };
