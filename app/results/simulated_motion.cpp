@@ -1,10 +1,14 @@
 #include "app/results/simulated_motion.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <limits>
 
 #include "app/results/joint_forces.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/scene/scene_facts.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
 #include "optim/objective/objective_run.hpp"
@@ -29,6 +33,24 @@ std::vector<std::vector<double>> instants_of(const std::vector<Objective>& objec
       instants[i].push_back(instant.tau);
   }
   return instants;
+}
+
+// Asks for the unit of a run of milliseconds in which nothing visible happens, though the bodies move.
+void warn_of_short_run(const Scene& scene, SimulatedMotion& motion) {
+  constexpr double kShort = 0.01, kVisible = 1e-5, kRounding = 1e-12;  // s; of a length, rad
+  const SimulationSettings& settings = scene.simulation;
+  const double span = settings.end_time - settings.start_time;
+  const Eigen::VectorXd moved = motion.simulation.y_end - motion.simulation.y_initial;
+  const double length = SceneFacts(scene).scale().length;
+  double most = 0;  // of a length, rad
+  for (Eigen::Index i = 0; 14 * i < moved.size(); ++i)
+    most = std::max(
+        {most, moved.segment<3>(7 * i).norm() / (length > 0 ? length : 1), moved.segment<4>(7 * i + 3).norm()});
+  if (scene.equilibrium || span > kShort || most > kVisible || most < kRounding) return;
+  motion.warnings.push_back(
+      fmt::format("simulation.end_time: in {:.3g} s nothing moves by more than {:.0e} of its "
+                  "length: is the time in ms? Write the unit, as in \"{:.3g} [s]\"",
+                  span, most, settings.end_time));
 }
 
 }  // namespace
@@ -88,6 +110,7 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   }
   run.progress.finish();
   if (!motion.simulation.ok()) return motion;
+  warn_of_short_run(scene, motion);
   motion.psi = motion.simulation.psi;
   for (std::size_t i = 0; i < objectives.size(); ++i) {
     motion.psi(static_cast<Eigen::Index>(i)) += objectives[i].parameters_only(rho);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "core/expression/did_you_mean.hpp"
@@ -170,9 +171,31 @@ void Checker::check_dimension(const std::string& where, const Expression& value,
     if (expected && !fits(found, *expected))
       issue(where,
             "'" + value.text() + "' has the dimension " + to_string(*found) + ", expected is " + to_string(*expected));
+    if (expected && (!found || found->is_none())) ask_for_degrees(where, value, names, *expected);
   } catch (const DimensionError& error) {
     issues_.push_back({where, error.what(), false, error.offset});
   }
+}
+
+// Asks for the unit of an angle of more than a turn, or of a rate that is a round number in degrees: a multiple of an
+// eighth of a turn. Multiples of 50 are round in radians, too. Who writes pi or a unit means radians.
+void Checker::ask_for_degrees(const std::string& where, const Expression& value, Names names,
+                              const Dimension& expected) {
+  const bool is_law = names == Names::time_law;
+  const bool is_angle = expected == dimension::kAngle, is_rate = expected == dimension::kRate;
+  if (!(is_angle || is_rate) || !(is_law || names == Names::none)) return;
+  const auto law = is_law ? facts_.law_at(value, facts_.scene().simulation.start_time) : std::nullopt;
+  const double x = is_law ? 0 : facts_.value(value).value_or(0);
+  const double angle = law ? (*law)[0] : is_angle ? x : 0, rate = law ? (*law)[1] : is_rate ? x : 0;
+  const bool is_large = std::abs(angle) > 2 * std::numbers::pi;
+  const bool is_round = rate != 0 && std::remainder(rate, 45) == 0 && std::remainder(rate, 50) != 0;
+  if (!is_large && !is_round) return;
+  const std::string text = value.text();
+  if (text.find_first_of('[') != std::string::npos || text.find("pi") != std::string::npos) return;
+  const std::string unit = is_large ? "rad" : "rad/s", degrees = is_large ? "deg" : "deg/s";
+  warning(where, "'" + text + "' is " + text_of(is_large ? angle : rate) + " " + unit +
+                     (is_law ? " at the start" : "") + ": are degrees meant? Write the unit, as in \"" +
+                     text_of(is_large ? angle : rate) + " [" + degrees + "]\" or \"[" + unit + "]\"");
 }
 
 void Checker::check_expression(const std::string& where, const Expression& value, Names names,
@@ -293,10 +316,13 @@ void Checker::expression(std::string_view key, const Expression& value, Names na
 
 void Checker::time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
                        const Says& says) {
-  if (samples)
-    at(key).check(*samples);
-  else
+  Checker inside = at(key);
+  if (samples) {
+    inside.check(*samples);
+    if (says.dimension) check_quantity(inside, *samples, *says.dimension);
+  } else {
     check_expression(path(key), value, Names::time_law, says.dimension);
+  }
 }
 
 void Checker::check_range(std::string_view key, double value, const Range& range) {

@@ -138,6 +138,8 @@ class Checker {
   void check_dimension(const std::string& path, const Expression& value, Names names,
                        const std::optional<Dimension>& expected);
 
+  void ask_for_degrees(const std::string& path, const Expression& value, Names names, const Dimension& expected);
+
   const SceneFacts& facts_;
   std::vector<SceneIssue>& issues_;
   std::string path_;
@@ -164,6 +166,8 @@ void check_meaning(Checker& checker, const Scene& scene);
 
 // Checks the units of samples.
 void check_units(Checker& checker, const SampleColumn& samples);
+// Checks samples of a quantity: their unit fits, and an angle does not jump by a turn.
+void check_quantity(Checker& checker, const SampleColumn& samples, const Dimension& quantity);
 
 // Reports names that occur more than once in a list, at paths of(index).
 template <class T, class PathOf>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 #include <tuple>
 
@@ -9,6 +10,7 @@
 #include "core/expression/syntax_tree.hpp"
 #include "core/scene/checker.hpp"
 #include "core/scene/inertia_check.hpp"
+#include "core/scene/signals.hpp"
 
 namespace mbsopt {
 
@@ -110,6 +112,24 @@ void check_friction(Checker& checker, const FrictionSpec& friction) {
   if (friction.stribeck_velocity) check_above_zero("stribeck_velocity", *friction.stribeck_velocity);
 }
 
+// Asks for the unit of an inertia whose radius of gyration is out of all proportion: kg mm^2 read as kg m^2 makes it a
+// thousand times larger. The root of this factor separates the two. Nearly massless bodies may have any inertia.
+void check_gyration(Checker& checker, const Body& body) {
+  constexpr double kFactor = 31.6, kNearlyMassless = 1e-3;
+  if (body.consistent_inertia) return;
+  const double mass = checker.facts().value(body.mass).value_or(0);
+  double largest = 0;
+  for (const Field* entry : {&body.inertia.xx, &body.inertia.yy, &body.inertia.zz})
+    largest = std::max(largest, checker.facts().value(*entry).value_or(0));
+  if (!(mass > 0 && largest > 0)) return;
+  const double radius = std::sqrt(largest / mass), extent = checker.facts().scale().length;
+  if (extent == 0 || radius <= kFactor * extent || mass < kNearlyMassless * checker.facts().scale().mass) return;
+  checker.warning(checker.path("inertia"), "is " + text_of(largest) + " kg m^2, a radius of gyration of " +
+                                               std::to_string(radius) + " m, in a mechanism within " + text_of(extent) +
+                                               " m: is it in kg mm^2? Write the unit, as in \"" + text_of(largest) +
+                                               " [kg mm^2]\"");
+}
+
 void check_moving(Checker& checker, const std::string& body) {
   if (body == "ground") checker.issue(checker.path("body"), "is the ground, which never moves");
 }
@@ -168,6 +188,7 @@ void check_meaning(Checker& checker, const Body& body) {
   const std::optional<double> mass = checker.facts().value(body.mass);
   if (mass && *mass < 0)
     checker.issue(checker.path("mass"), "is " + text_of(*mass) + " kg, a mass must not be negative");
+  check_gyration(checker, body);
 }
 
 void check_meaning(Checker& checker, const InertiaField& inertia) {
@@ -246,8 +267,31 @@ void check_units(Checker& checker, const SampleColumn& samples) {
   check("time_unit", samples.time_unit, dimension::kTime);
 }
 
+void check_quantity(Checker& checker, const SampleColumn& samples, const Dimension& quantity) {
+  const std::optional<Unit> unit = parse_unit(samples.unit);
+  if (!samples.unit.empty() && unit && !unit->dimension.is_none() && !compatible(unit->dimension, quantity))
+    return checker.issue(checker.path("column"), "'" + samples.column + "' is in " + to_string(unit->dimension) +
+                                                     "; expected is " +
+                                                     (quantity.is_none() ? "a number" : to_string(quantity)));
+  if (quantity != dimension::kAngle || !samples.curve) return;
+  const std::vector<double>& values = samples.curve->y();
+  const bool in_rad = unit && unit->dimension == quantity;
+  std::size_t wrap = first_wrap(values, 2 * std::numbers::pi);
+  const bool in_degrees = wrap == 0 && !in_rad && (wrap = first_wrap(values, 360)) > 0;
+  if (wrap == 0) return;
+  checker.warning(checker.path("column"),
+                  "'" + samples.column + "' jumps from " + text_of(values[wrap - 1]) + " to " + text_of(values[wrap]) +
+                      " at " + text_of(samples.curve->x()[wrap]) + " s, by about a turn" +
+                      (in_degrees ? " in degrees, where rad are expected" : "") +
+                      ": the motion turns back there. Take whole turns out of the column, so that it goes on counting");
+}
+
 void check_meaning(Checker& checker, const SampledLaw& law) { check_units(checker, law); }
-void check_meaning(Checker& checker, const Signal& signal) { check_units(checker, signal); }
+void check_meaning(Checker& checker, const Signal& signal) {
+  check_units(checker, signal);
+  const std::optional<Unit> unit = parse_unit(signal.unit);
+  if (unit && unit->dimension == dimension::kAngle) check_quantity(checker, signal, unit->dimension);
+}
 
 namespace {
 

@@ -1,5 +1,8 @@
 #include "core/scene/signals.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace mbsopt {
 
 Expression expression_of(const SampleColumn& samples, const std::string& name) {
@@ -20,6 +23,19 @@ void add_signals(Symbols& symbols, const Scene& scene) {
   for (const Signal& signal : scene.signals)
     if (symbols.input(signal.name) < 0 && !symbols.definition(signal.name))
       symbols.add_definition(signal.name, expression_of(signal));
+}
+
+std::size_t first_wrap(const std::vector<double>& values, double turn) {
+  constexpr double kAbout = 0.1, kUnusual = 5;  // of a turn; of the median step
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(std::abs(values[i] - values[i - 1]));
+  if (steps.size() < 2) return 0;
+  std::vector<double> sorted = steps;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::ranges::nth_element(sorted, middle);
+  const auto wrap = std::ranges::find_if(
+      steps, [&](double step) { return std::abs(step - turn) < kAbout * turn && step > kUnusual * *middle; });
+  return wrap == steps.end() ? 0 : static_cast<std::size_t>(wrap - steps.begin()) + 1;
 }
 
 Covered covered_by(const Curve& samples, double delay) {

@@ -19,6 +19,9 @@ Expression expression_of(const Signal& signal);
 // Adds all signals as definitions, which need an input "t".
 void add_signals(Symbols& symbols, const Scene& scene);
 
+// The first sample that differs from the one before by about a turn, and by much more than usual; 0 if there is none.
+std::size_t first_wrap(const std::vector<double>& values, double turn);
+
 // The span of time that samples cover, shifted by delay. The last value of hold counts for one more interval.  [s]
 struct Covered {
   double first = 0, last = 0;

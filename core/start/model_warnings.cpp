@@ -247,6 +247,26 @@ void add_rounding_of_derivatives(const Assembly& assembly, std::vector<std::stri
                   rounding));
 }
 
+// The arm of a joint's point that is ten times longer than all other arms: a length in mm where m is read.
+std::string hint_of_long_arm(const MechanismData& d, int joint) {
+  constexpr double kTimes = 10;
+  double arm = 0, others = 0;
+  int owner = 0;
+  for (const Constraint& c : d.constraints) {
+    c.for_each_point([&](int body, const Vector3d& s) {
+      if (body > 0 && c.joint == joint && s.norm() > arm)
+        others = std::max(others, arm), arm = s.norm(), owner = body;
+      else if (body > 0)
+        others = std::max(others, s.norm());
+    });
+  }
+  if (!(others > 0 && arm > kTimes * others)) return "";
+  return fmt::format(
+      "; its point lies {:.3g} m from the centre of mass of '{}', and no other farther than {:.3g} m: "
+      "is it in mm? Write the unit, as in \"{:.3g} [mm]\"",
+      arm, d.body_names[at(owner)], others, arm);
+}
+
 void add_violations(const MechanismData& d, std::vector<std::string>& warnings) {
   double size = 0;
   for (const Constraint& c : d.constraints) {
@@ -270,8 +290,8 @@ void add_violations(const MechanismData& d, std::vector<std::string>& warnings) 
     if (amount <= kMuchViolated * size || size == 0) continue;
     warnings.push_back(fmt::format(
         "the guess (position, orientation of the bodies) leaves the points of joint '{}' {:.3g} m apart; "
-        "check that the assembled position is the one that is meant (`simulate` writes a report with a drawing)",
-        d.joint_names[at(joint)], amount));
+        "check that the assembled position is the one that is meant (`simulate` writes a report with a drawing){}",
+        d.joint_names[at(joint)], amount, hint_of_long_arm(d, joint)));
   }
   for (const auto& [joint, amount] : worst_axis) {
     if (amount <= kMuchViolated) continue;

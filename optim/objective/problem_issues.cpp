@@ -65,6 +65,14 @@ void check_track(Checker& checker, const TrackTerm& term, const std::string& pla
 
 void check_meaning(Checker& checker, const TrackTerm& term) { check_column_unit(checker, term.unit, term.sensor); }
 
+void check_meaning(Checker& checker, const DriveLaw& law) {
+  const std::vector<Drive>& drives = checker.facts().scene().drives;
+  const auto drive = std::ranges::find(drives, law.drive, &Drive::name);
+  if (drive != drives.end())
+    checker.time_law("law", law.law, law.samples,
+                     {"", Need::required, dimension_of_drive(drive->type, drive->coordinate)});
+}
+
 void check_meaning(Checker& checker, const SignalSamples& samples) {
   check_units(checker, samples);
   const std::vector<Signal>& signals = checker.facts().scene().signals;

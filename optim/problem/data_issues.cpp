@@ -10,7 +10,7 @@
 
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/scene_path.hpp"
-#include "optim/machine/median.hpp"
+#include "core/scene/signals.hpp"
 #include "optim/problem/logged_columns.hpp"
 
 namespace mbsopt {
@@ -242,30 +242,22 @@ class DataCheck {
   // A jump is about a turn, and larger than usual steps of the record. Returns whether there is one.
   bool check_turns(std::size_t c, const std::vector<std::size_t>& rows) {
     if (experiment_.channels[c].unwrap) return check_unwrapped(c, rows);
-    constexpr double kAbout = 0.1, kUnusual = 5;  // of a turn; of the median step
     const ChannelSpec& channel = experiment_.channels[c];
     const Sensor* const sensor = angle_sensor(channel);
-    if (!sensor || rows.size() < 3) return false;
-    const std::vector<double>& measured = data_.column(channel.column);
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < rows.size(); ++i) steps.push_back(std::abs(measured[rows[i]] - measured[rows[i - 1]]));
-    const double usual = kUnusual * median(steps);
-    const double turn = 2 * std::numbers::pi * std::abs(channel.gain.number());
-    for (std::size_t i = 1; i < rows.size(); ++i) {
-      const double step = steps[i - 1];
-      const auto jumps_by = [&](double size) { return std::abs(step - size) < kAbout * size && step > usual; };
-      const bool degrees = channel.gain.number() == 1 && jumps_by(360);
-      if (!degrees && !jumps_by(turn)) continue;
-      issues_.push_back(
-          {channel_path(c, "column"),
-           fmt::format("{}: '{}' jumps from {:.6g} to {:.6g}, by about a turn{}; the sensor '{}' goes on counting. "
-                       "Unwrap the column (\"unwrap\": true does)",
-                       data_.place(rows[i]), channel.column, measured[rows[i - 1]], measured[rows[i]],
-                       degrees ? " in degrees, where rad are expected" : "", sensor->name),
-           true});
-      return true;
-    }
-    return false;
+    if (!sensor) return false;
+    std::vector<double> measured;
+    for (const std::size_t row : rows) measured.push_back(data_.column(channel.column)[row]);
+    std::size_t wrap = first_wrap(measured, 2 * std::numbers::pi * std::abs(channel.gain.number()));
+    const bool degrees = wrap == 0 && channel.gain.number() == 1 && (wrap = first_wrap(measured, 360)) > 0;
+    if (wrap == 0) return false;
+    issues_.push_back(
+        {channel_path(c, "column"),
+         fmt::format("{}: '{}' jumps from {:.6g} to {:.6g}, by about a turn{}; the sensor '{}' goes on counting. "
+                     "Unwrap the column (\"unwrap\": true does)",
+                     data_.place(rows[wrap]), channel.column, measured[wrap - 1], measured[wrap],
+                     degrees ? " in degrees, where rad are expected" : "", sensor->name),
+         true});
+    return true;
   }
 
   const ExperimentSpec& experiment_;

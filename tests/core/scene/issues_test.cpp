@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <limits>
+#include <memory>
+#include <set>
 
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/type_table.hpp"
@@ -208,6 +210,107 @@ TEST_CASE("circular and endless definitions are reported once, at the definition
   const std::vector<SceneIssue> issues = find_issues(scene);
   REQUIRE(issues.size() == 1);
   CHECK_THAT(issues[0].message, Catch::Contains("nest deeper"));
+}
+
+TEST_CASE("definitions between two circles belong to neither", "[scene]") {
+  Scene scene = hinged_rod();
+  scene.definitions = {{"a", Expression::parse("b")},       {"b", Expression::parse("a + between")},
+                       {"between", Expression::parse("c")}, {"c", Expression::parse("d")},
+                       {"d", Expression::parse("c*2")},     {"half", Expression::parse("half + 1")}};
+  std::set<std::string> paths;
+  for (const SceneIssue& issue : find_issues(scene)) paths.insert(issue.path);
+  CHECK(paths ==
+        std::set<std::string>{"definitions.a", "definitions.b", "definitions.c", "definitions.d", "definitions.half"});
+}
+
+TEST_CASE("definitions have their values wherever they are used, in any order", "[scene]") {
+  Scene scene = hinged_rod();
+  scene.definitions = {{"third", Expression::parse("second + m")},
+                       {"second", Expression::parse("3*half")},
+                       {"half", Expression::parse("m/2")}};
+  const SceneFacts facts(scene);
+  CHECK(facts.value(Expression::parse("2*third + m")).value() == 12);
+  CHECK_FALSE(facts.value(Expression::parse("2*fourth")));
+}
+
+TEST_CASE("twenty thousand definitions are checked in time that grows as their number", "[scene]") {
+  for (const bool reverse : {false, true}) {
+    Scene scene = hinged_rod();
+    const int n = 20'000;
+    for (int i = 0; i < n; ++i)
+      scene.definitions.push_back(
+          {"d" + std::to_string(i), Expression::parse("d" + std::to_string(reverse ? i + 1 : i - 1))});
+    scene.definitions[reverse ? n : 1].value = Expression(1.0);
+    const std::vector<SceneIssue> issues = find_issues(scene);  // minutes if each looked at all others
+    REQUIRE_FALSE(issues.empty());
+    CHECK_THAT(issues.back().message, Catch::Contains("nest deeper"));
+  }
+}
+
+TEST_CASE("angles beyond a turn and rates that are round in degrees are asked about", "[scene]") {
+  Scene scene = hinged_rod();
+  scene.parameters.push_back({"theta0", 75.0});
+  const auto asked = [&](const Expression& value, const Expression& rate) {
+    scene.conditions = {{"theta", value, rate}};
+    return at(scene, "initial.conditions[0].value") + at(scene, "initial.conditions[0].rate");
+  };
+  CHECK_THAT(asked(Expression::parse("-35"), Expression(0.0)),
+             Catch::Contains("'-35' is -35 rad: are degrees meant?") && Catch::Contains("\"-35 [deg]\""));
+  CHECK_THAT(asked(Expression::parse("theta0"), Expression(0.0)), Catch::Contains("is 75 rad"));
+  CHECK_THAT(asked(Expression(0.0), Expression(-270.0)), Catch::Contains("-270 rad/s"));
+  for (const char* meant : {"6.28", "-3", "75 [rad]", "75 [deg]", "12*pi"})
+    CHECK(asked(Expression::parse(meant), Expression(0.0)).empty());
+  for (const char* meant : {"314", "100", "450", "60", "2*pi*45", "360 [deg/s]"})
+    CHECK(asked(Expression(0.0), Expression::parse(meant)).empty());
+  scene.parameters.back().unit = "rad";
+  CHECK(asked(Expression::parse("theta0"), Expression(0.0)).empty());
+}
+
+TEST_CASE("the law of a drive in degrees is asked about", "[scene]") {
+  Scene scene = hinged_rod();
+  const auto asked = [&](const char* law) {
+    scene.drives = {{"turn", "angle", "", "", "pin", "ground", "", "O", "O", Expression::parse(law), {}}};
+    return at(scene, "drives[0].law");
+  };
+  CHECK_THAT(asked("0.2 - 180*t"), Catch::Contains("-180 rad/s at the start"));
+  CHECK_THAT(asked("45 + t"), Catch::Contains("45 rad at the start"));
+  for (const char* meant : {"0.3 + 6*t", "2*pi*30*t", "314*t", "180 [deg/s]*t", "sin(6*t)"})
+    CHECK(asked(meant).empty());
+}
+
+TEST_CASE("a radius of gyration out of all proportion is asked about", "[scene]") {
+  Scene scene = hinged_rod();
+  scene.bodies[0].inertia = {700.0, 700.0, 700.0, 0.0, 0.0, 0.0};  // of a radius of 18.7 m, in 1 m
+  CHECK(at(scene, "bodies[0].inertia").empty());
+  scene.bodies[0].inertia = {7000.0, 7000.0, 7000.0, 0.0, 0.0, 0.0};
+  CHECK_THAT(at(scene, "bodies[0].inertia"), Catch::Contains("[kg mm^2]"));
+  scene.bodies.push_back(scene.bodies[0]);  // as a nearly massless rotor
+  scene.bodies[1].name = "heavy", scene.bodies[1].mass = 1e4;
+  CHECK(at(scene, "bodies[0].inertia").empty());
+}
+
+TEST_CASE("samples of a drive are in its unit, and an angle goes on over turns", "[scene]") {
+  Scene scene = hinged_rod();
+  const auto issue = [&](const std::string& unit, std::vector<double> values, const char* type) {
+    SampledLaw law;
+    law.column = "x", law.unit = unit;
+    std::vector<double> t(values.size());
+    for (std::size_t i = 0; i < t.size(); ++i) t[i] = 0.25 * static_cast<double>(i);
+    law.curve = std::make_shared<const Curve>(Interpolation::spline, t, std::move(values));
+    scene.joints[0].type = "cylindrical";
+    scene.drives = {{"turn", type, "", "", "pin", "ground", "", "O", "O", Expression(0.0), law}};
+    return at(scene, "drives[0].law.column");
+  };
+  const std::vector<double> smooth{0, 0.5, 1, 1.5, 2, 2.5}, wrapped{2, 2.5, 3, -2.8, -2.3, -1.8};
+  CHECK(issue("rad", smooth, "angle").empty());
+  CHECK(issue("", smooth, "angle").empty());
+  CHECK_THAT(issue("m", smooth, "angle"), Catch::Contains("'x' is in m; expected is rad"));
+  CHECK_THAT(issue("kg", smooth, "displacement"), Catch::Contains("expected is m"));
+  CHECK_THAT(issue("rad/s", smooth, "angle"), Catch::Contains("expected is rad"));
+  CHECK_THAT(issue("rad", smooth, "displacement"), Catch::Contains("is in rad; expected is m"));
+  CHECK_THAT(issue("rad", wrapped, "angle"), Catch::Contains("jumps from 3 to -2.8 at 0.75 s, by about a turn"));
+  CHECK(issue("m", wrapped, "displacement").empty());
+  CHECK_THAT(issue("", {340, 350, 1, 11, 21, 30}, "angle"), Catch::Contains("in degrees"));
 }
 
 TEST_CASE("sensors that are expressions are checked", "[scene]") {
