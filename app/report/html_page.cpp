@@ -125,8 +125,7 @@ void HtmlPage::motion(std::string_view json, std::string_view stills) {
 void HtmlPage::comparison(std::string_view runs) {
   heading("Two runs compared");
   body_ += "<div data-comparison></div><noscript><p>A browser with scripts compares them here.</p></noscript>\n";
-  compared_ = runs;
-  for (std::size_t at = 0; (at = compared_.find("</", at)) != std::string::npos;) compared_.insert(at + 1, "\\");
+  compared_ = without_tags(std::string(runs));
 }
 
 std::string HtmlPage::text() const {

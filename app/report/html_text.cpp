@@ -49,10 +49,11 @@ std::string html_words(std::string_view text) {
   return words;
 }
 
-std::string json_quoted(std::string_view text) {
-  std::string quoted = json_text(text);
-  for (std::size_t at = 0; (at = quoted.find("</", at)) != std::string::npos; at += 3) quoted.insert(at + 1, 1, '\\');
-  return quoted;
+std::string json_quoted(std::string_view text) { return without_tags(json_text(text)); }
+
+std::string without_tags(std::string json) {
+  for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) json.replace(at, 1, "\\u003c");
+  return json;
 }
 
 }  // namespace mbsopt

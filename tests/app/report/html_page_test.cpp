@@ -41,6 +41,18 @@ TEST_CASE("a page holds the data of its plots, each array once", "[report]") {
   CHECK(data.at("arrays")[first.at("y").get<std::size_t>()] == nlohmann::json({1, 2, nullptr}));
 }
 
+TEST_CASE("no name of a plot or of a run can end the block of JSON", "[report]") {
+  HtmlPage page("p");
+  page.plot(line("<!--<script>", {1, 2, 3}));
+  page.comparison(R"([{"name":"<!--<SCRIPT>"}])");
+  const std::string text = page.text();
+  const nlohmann::json data = data_of(text);
+  CHECK(data.at("plots")[0].at("series")[0].at("name") == "<!--<script>");
+  CHECK(data.at("runs")[0].at("name") == "<!--<SCRIPT>");
+  const std::size_t begin = text.find("id=\"data\">") + 10;
+  CHECK(text.find('<', begin) == text.find("</script>", begin));
+}
+
 TEST_CASE("a cell shows rounded numbers and holds all their digits", "[report]") {
   HtmlPage page("p");
   page.table({"name", "value"}, {{"a", TableCell("1.23", "1.2345678901234567")}, {"b", "2"}});
