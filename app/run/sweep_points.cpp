@@ -135,6 +135,8 @@ SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long s
     points.values = grid(ranges);
     return points;
   }
+  if (static_cast<std::size_t>(*options.samples) > kMostPoints)
+    throw std::invalid_argument(fmt::format("--samples: {} are more than {} points", *options.samples, kMostPoints));
   std::vector<Parameter> parameters;
   for (const VariedRange& range : ranges) {
     if (range.count > 0)

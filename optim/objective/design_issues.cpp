@@ -1,5 +1,7 @@
 #include "optim/objective/design_issues.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 
@@ -104,7 +106,15 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
   if (spec.multistart && spec.multistart->all_branches) append(branch_issues(scene), issues);
   if (spec.multistart)
     append(missing_bounds(spec.variables, scene, "design.multistart draws starts between them"), issues);
+  if (spec.multistart) append(starts_issues(*spec.multistart, "design.multistart"), issues);
   return issues;
+}
+
+std::vector<DesignIssue> starts_issues(const MultistartSpec& spec, const std::string& path) {
+  constexpr int kMost = 1'000'000;  // a start takes a process, 1 ms at least, and 1 kB for its record
+  if (spec.starts <= kMost) return {};
+  return {{path + ".starts",
+           fmt::format("is {}, at most {} are possible: each is a search in its own process", spec.starts, kMost)}};
 }
 
 namespace {

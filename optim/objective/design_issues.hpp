@@ -23,4 +23,7 @@ std::optional<DesignIssue> curvature_issue(const Problem& problem);
 std::vector<DesignIssue> missing_bounds(const std::vector<std::string>& variables, const Scene& scene,
                                         const std::string& by);
 
+// Reports more starts than any machine runs. path: of the multistart.
+std::vector<DesignIssue> starts_issues(const MultistartSpec& spec, const std::string& path);
+
 }  // namespace mbsopt

@@ -280,6 +280,8 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
     for (const DesignIssue& found : missing_bounds(identification.variables, checker.facts().scene(),
                                                    "identification.multistart draws starts between them"))
       checker.issue(found.path, found.message);
+    for (const DesignIssue& found : starts_issues(*identification.multistart, checker.path("multistart")))
+      checker.issue(found.path, found.message);
     if (identification.multistart->all_branches)
       checker.issue(checker.path("multistart") + ".branches",
                     "is \"all\", which is of design.multistart only; a fit begins at the poses in the file");
