@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <string_view>
 
 #include "core/expression/counted.hpp"
 #include "core/scene/vocabulary.hpp"
@@ -140,18 +141,30 @@ class Chooser {
   }
 
   // Returns whether an implicit method needs less than half of the right-hand sides that an unfinished explicit run
-  // would need. Their number does not depend on chance, but the time does.
+  // would need. Their number does not depend on chance, but the time does. The implicit run ends when it needs more.
   bool implicit_is_cheaper(const Point& unfinished) {
-    const SimulationSettings settings = settings_at("radau5", unfinished.rtol(), base_.integrator.max_steps);
-    const Answer implicit = answer(settings);
-    if (!implicit.ok || unfinished.answer.steps.times.empty()) return false;
+    constexpr double kPerStep = 6;  // right-hand sides at least: two Newton iterations of three stages
+    if (unfinished.answer.steps.times.empty()) return false;
     const double done = unfinished.answer.steps.times.back() - base_.start_time;
     const double needed =
         static_cast<double>(unfinished.answer.statistics.rhs_evaluations) * (base_.end_time - base_.start_time) / done;
+    const double most_steps = std::min(needed / (2 * kPerStep), static_cast<double>(base_.integrator.max_steps));
+    const Answer implicit = answer(settings_at("radau5", unfinished.rtol(), static_cast<long>(most_steps)));
+    if (!implicit.ok) return false;
     const double ratio = needed / static_cast<double>(implicit.statistics.rhs_evaluations);
     if (!(ratio > 2)) return false;
     stiff_why_ = fmt::format("{} would need {:.1f} times as many right-hand sides", method_, ratio);
     return true;
+  }
+
+  // Returns whether the method of the verifying run needs less than half of the right-hand sides that dopri5 would need
+  // until its error falls to `aim`. An error falls as h^p, so that their number grows as (error/aim)^(1/p).
+  bool high_order_is_cheaper(const Point& point, const Answer& verified, double error, double aim) const {
+    if (implicit_ || std::string_view(method_) == verifier_ || error <= result_.wanted) return false;
+    const auto needed = [&](const Answer& answer, double from, double order) {
+      return static_cast<double>(answer.statistics.rhs_evaluations) * std::pow(std::max(1.0, from / aim), 1 / order);
+    };
+    return 2 * needed(verified, error / kTighter, 8) < needed(point.answer, error, 5);
   }
 
   // A point within the wanted accuracy, or the most exact one found. There is none if nothing ran, or if the method
@@ -189,6 +202,12 @@ class Chooser {
       }
       judge(point, *right);
       const double error = std::max(point.largest(), AccuracyChoice::kRounding), aim = result_.wanted / 3;
+      if (high_order_is_cheaper(point, *right, error, aim)) {
+        method_ = verifier_, result_.why = "a high order takes fewer right-hand sides to this accuracy";
+        rtol = point.rtol() * std::max(aim / error, 1e-4);
+        best.reset(), last.reset();
+        continue;
+      }
       // The order in which the error falls with the tolerance, between the last two points.
       double order = 1;
       if (last && last->rtol() != point.rtol() && last->largest() > 0 && error > AccuracyChoice::kRounding)

@@ -101,6 +101,30 @@ TEST_CASE("the estimated error is the true one within a factor of 10", "[accurac
   CHECK(estimates > 60);
 }
 
+// A flywheel slows down: theta = w0 J/c (1 - exp(-c t/J)), 560 rad. Its marks are to be right to 1e-5 of a turn.
+TEST_CASE("many turns get a high order, not ten times the steps, and few runs to find that", "[accuracy]") {
+  Problem problem = read_problem_text(R"({"format": 1, "name": "flywheel", "gravity": [0, 0, 0],
+    "bodies": [{"name": "wheel", "mass": 5, "inertia": [0.02, 0.02, 0.03], "points": {"mark": [0.1, 0, 0]}}],
+    "joints": [{"name": "shaft", "type": "revolute", "body2": "wheel", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
+    "forces": [{"name": "drag", "type": "rsda", "joint": "shaft", "damping": 0.003}],
+    "sensors": {"q": {"quantity": "angle", "joint": "shaft"},
+                "x": {"quantity": "position", "body": "wheel", "point": "mark", "component": "x"}},
+    "initial": {"conditions": [{"sensor": "q", "value": 0, "rate": 90}]},
+    "simulation": {"end_time": 9.5, "accuracy": "engineering"},
+    "objectives": {"place": {"terminal": "10*x"}}})",
+                                      "flywheel.json");
+  const AccuracyChoice choice = choose_accuracy(problem.scene, objectives_of(problem));
+  REQUIRE(choice.ok);
+  CHECK(choice.reached);
+  CHECK(choice.settings.integrator.type == "dopri853");
+  CHECK(choice.simulations <= 6);
+  problem.scene.simulation.accuracy.reset();
+  const TradeoffRuns runs(problem.scene, objectives_of(problem));
+  const Answer chosen = runs.motion(choice.settings);
+  const double theta = 90 * 0.03 / 0.003 * (1 - std::exp(-0.003 * 9.5 / 0.03));
+  CHECK(std::abs(chosen.psi(0) - std::cos(theta)) < 1e-5);
+}
+
 TEST_CASE("a stiff scene gets an implicit method, one that is not an explicit one", "[accuracy]") {
   const auto chosen = [](const std::string& text, double accuracy) {
     Problem problem = read_problem_text(text, "honey.json");
