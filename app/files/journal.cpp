@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -189,6 +190,11 @@ void Journal::add(const char* kind, const Json& content) {
     throw WriteError(path_, "cannot be written");
   }
   seal_ = line.seal, bytes_ += line.text.size();
+}
+
+bool Journal::exists() const {
+  struct stat file;
+  return ::fstat(descriptor_, &file) == 0 && file.st_nlink > 0;
 }
 
 }  // namespace mbsopt

@@ -59,6 +59,7 @@ class Journal {
   Journal& operator=(const Journal&) = delete;
 
   void add(const char* kind, const Json& content);  // throws WriteError; then the line is not there
+  bool exists() const;                              // false where its file was deleted meanwhile
 
  private:
   void open();

@@ -41,8 +41,7 @@ LongRun::~LongRun() {
   if (!journal_ || finished_) return;
   try {
     run_.progress.finish();
-    run_.context.err << fmt::format("the journal keeps what was computed; 'mbsopt resume {}' continues from there\n",
-                                    run_.folder.path().string());
+    run_.context.err << how_to_continue() << '\n';
   } catch (...) {  // the exception under way says more than this one
   }
 }
@@ -93,8 +92,13 @@ void LongRun::add(const char* kind, const Json& content) {
   }
 }
 
+std::string LongRun::how_to_continue() const {
+  if (!journal_->exists()) return "the journal was deleted during the run, so nothing can be resumed";
+  return fmt::format("'mbsopt resume {}' continues", run_.folder.path().string());
+}
+
 void LongRun::stopped(const std::string& kept) {
-  const std::string words = fmt::format("{}; 'mbsopt resume {}' continues", kept, run_.folder.path().string());
+  const std::string words = kept + "; " + how_to_continue();
   failure_ ? run_.failed(*failure_ + "; " + words) : run_.stopped(words);
 }
 

@@ -42,6 +42,7 @@ class LongRun {
 
  private:
   void refuse_what_has_changed() const;
+  std::string how_to_continue() const;
 
   Run& run_;
   JournalContent earlier_;

@@ -73,6 +73,7 @@ OutputFolder::OutputFolder(const std::string& requested, const std::string& prob
 }
 
 std::unique_ptr<FolderLock> OutputFolder::claim() const {
+  create_folder(path_);
   auto lock = std::make_unique<FolderLock>(path_);
   refuse_if_taken();
   if (lock->held()) remove_parts(path_);

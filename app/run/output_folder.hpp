@@ -24,8 +24,8 @@ class OutputFolder {
 
   const std::filesystem::path& path() const { return path_; }
   const std::string& owner() const { return owner_; }  // provenance.input in result.json
-  // Locks the folder and removes unfinished files of a killed run. Throws OutputError if another command writes into
-  // it, or has done so since.
+  // Locks the folder, made anew if it was deleted, and removes unfinished files of a killed run. Throws OutputError if
+  // another command writes into it, or has done so since.
   std::unique_ptr<FolderLock> claim() const;
   void write(const std::string& file, std::string_view content) const;
   // Changes "running" in result.json to "failed" without a further byte, when nothing can be written any more.

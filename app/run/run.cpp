@@ -103,7 +103,7 @@ Run::~Run() {
     set(RunStatus::failed);
     const std::string text = result_json_text(result);
     if (context.json) *context.json << text;
-    folder.write("result.json", text);
+    write("result.json", text);
   } catch (...) {
     folder.mark_failed();  // the exception under way says more than this one
   }
@@ -122,6 +122,10 @@ void Run::set(RunStatus status) {
 }
 
 void Run::write(const std::string& file, std::string_view content) {
+  if (lock_ && !std::filesystem::exists(folder.path())) {
+    warn(fmt::format("the folder {} was deleted during the run; it is made anew", folder.path().string()));
+    lock_ = folder.claim();
+  }
   folder.write(file, content);
   written_.push_back(file);
 }
