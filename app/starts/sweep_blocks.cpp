@@ -83,11 +83,12 @@ Json record_of_block(const Problem& problem, const SweepPoints& points, bool gra
     for (std::size_t k = 0; k < points.parameters.size(); ++k)
       rho(points.parameters[k]) = points.values[i](static_cast<Eigen::Index>(k));
     const Evaluation& e = gradients ? evaluator.gradients(rho) : evaluator.values(rho);
-    if (interrupted()) {
+    Json row = e.ok ? to_json(e, evaluator.true_values(rho)) : Json{{"failed", e.message}};
+    if (interrupted()) {  // which may have cut off the evaluation or the true values
       record["status"] = "stopped";
       break;
     }
-    record["rows"].push_back(e.ok ? to_json(e, evaluator.true_values(rho)) : Json{{"failed", e.message}});
+    record["rows"].push_back(std::move(row));
   }
   return record;
 }
