@@ -18,6 +18,7 @@ namespace {
 // that.
 constexpr double kSettled = 1000;
 constexpr double kTouches = 1e-5;  // relative to the bound's size: the barrier keeps solutions this near to a bound
+constexpr double kWide = 10;       // sizes of a variable: the barrier keeps it as near to bounds that are wider
 
 bool touches(double value, const std::optional<double>& bound, double size) {
   return bound && std::abs(value - *bound) <= kTouches * size;
@@ -178,12 +179,15 @@ void describe_start(const Problem& problem, const CaseEvaluator& evaluator, cons
   for (std::string& warning : idle_variables(start, problem)) result.warnings.push_back(std::move(warning));
 }
 
-void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, const NlpPoint& end,
+void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, const NlpResult& solution,
                   DesignResult& result) {
+  const NlpPoint& end = solution.point;
+  const Eigen::VectorXd rho_x = program.scaling().rho_x(solution.x);  // how large the optimiser takes the variables
   for (std::size_t k = 0; k < result.variables.size(); ++k) {
     DesignVariable& v = result.variables[k];
     v.value = result.rho(evaluator.variables()[k]);
-    const double size = v.lower && v.upper ? *v.upper - *v.lower : std::max(std::abs(v.initial), std::abs(v.value));
+    const double width = v.lower && v.upper ? *v.upper - *v.lower : INFINITY;
+    const double size = std::min(width, kWide * rho_x(static_cast<Eigen::Index>(k)));
     v.at_lower = touches(v.value, v.lower, size), v.at_upper = touches(v.value, v.upper, size);
   }
   result.objective_final = end.f;

@@ -15,7 +15,7 @@ void describe_start(const Problem& problem, const CaseEvaluator& evaluator, cons
                     const CaseEvaluation& start, DesignResult& result);
 
 // Values of the variables and constraints at the end of the search; result.rho is set already.
-void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, const NlpPoint& end,
+void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, const NlpResult& solution,
                   DesignResult& result);
 
 // Evaluates the solution once more: true extremes, optimality, prices of limits, limits in conflict.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -76,9 +77,41 @@ PreparedDesign::PreparedDesign(const Problem& given, const DesignOptions& option
       spec(checked(problem)),
       evaluator(problem, objective_names(spec), spec.variables, evaluator_options(options, std::move(progress)),
                 options.threads),
-      scaling(chosen(problem.scene, evaluator.variables())),
+      scaling(chosen(problem.scene, evaluator.variables()), felt_changes()),
       x_start(start_of(evaluator, scaling)) {
   if (!spec.sharpness) spec.sharpness = sharpness();
+}
+
+// Per variable the change d that alters an objective or a limit by its size:
+//   |g| d + |h| d^2/2 = |psi|      g: slope at the start, h: its change along a short step of all these variables
+// Empty if all values tell how large their variables are. Where h is not known, values tell that unless they are 0.
+Eigen::VectorXd PreparedDesign::felt_changes() {
+  constexpr double kShort = 1e-3, kShortOfRange = 1e-8;  // of the value; of a range, which may be far too wide
+  const std::vector<Parameter> variables = chosen(problem.scene, evaluator.variables());
+  if (std::ranges::none_of(variables, is_scaled_by_range)) return {};
+  const CaseEvaluation start = evaluator.gradients(evaluator.start());
+  if (!start.ok) return {};
+  Eigen::VectorXd beside = evaluator.start();
+  for (std::size_t k = 0; k < variables.size(); ++k) {
+    const Parameter& p = variables[k];
+    if (!is_scaled_by_range(p)) continue;
+    const double of_range = p.lower && p.upper ? kShortOfRange * (*p.upper - *p.lower) : kShort;
+    const double step = p.value != 0 ? kShort * std::abs(p.value) : of_range;
+    beside(evaluator.variables()[k]) += p.upper && p.value + step > *p.upper ? -step : step;
+  }
+  const CaseEvaluation there = evaluator.gradients(beside);
+  Eigen::VectorXd felt(start.psi_rho.cols());
+  for (Eigen::Index k = 0; k < felt.size(); ++k) {
+    const int index = evaluator.variables()[static_cast<std::size_t>(k)];
+    const double step = beside(index) - start.rho(index);
+    felt(k) = there.ok || start.rho(index) == 0 ? std::numeric_limits<double>::infinity() : 0;
+    for (Eigen::Index i = 0; i < start.psi.size(); ++i) {
+      const double size = std::abs(start.psi(i)), g = std::abs(start.psi_rho(i, k));
+      const double h = there.ok && step != 0 ? std::abs((there.psi_rho(i, k) - start.psi_rho(i, k)) / step) : 0;
+      if (size > 0 && g + h > 0) felt(k) = std::min(felt(k), 2 * size / (g + std::sqrt(g * g + 2 * h * size)));
+    }
+  }
+  return felt;
 }
 
 // The sharpness of the maximum over cases is relative to the largest value at the start.

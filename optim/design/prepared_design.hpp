@@ -32,6 +32,7 @@ struct PreparedDesign {
 
  private:
   std::optional<double> sharpness();
+  Eigen::VectorXd felt_changes();
 };
 
 std::vector<Parameter> chosen(const Scene& scene, const std::vector<int>& indices);

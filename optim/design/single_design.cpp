@@ -71,7 +71,7 @@ class SingleDesign {
   }
 
   void describe_last_point() {
-    describe_end(prepared_.evaluator, program_, rounds_.solution.point, result_);
+    describe_end(prepared_.evaluator, program_, rounds_.solution, result_);
     if (abandoned_ || rounds_.true_values.empty()) return;
     describe_solution(program_, prepared_.scaling, rounds_, prepared_.spec.optimizer.tolerance, result_);
     judge_solution(prepared_.spec, program_, prepared_.evaluator, result_);

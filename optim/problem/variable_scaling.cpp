@@ -28,10 +28,12 @@ void check(const Parameter& p) {
                     p.name, p.value, p.lower ? fmt::format(", lower {}", *p.lower) : ""));
 }
 
-double linear_scale(const Parameter& p) {
-  double s = std::abs(p.value);
-  if (p.lower && p.upper) s = std::max(s, (*p.upper - *p.lower) / 100);
-  return s > 0 ? s : 1;
+double range_of(const Parameter& p) { return p.upper.value_or(kInfinity) - p.lower.value_or(-kInfinity); }
+
+double linear_scale(const Parameter& p, double felt) {
+  const double size = std::abs(p.value), range = range_of(p), reach = std::min(range / kWideRange, felt);
+  const bool says = size > 0 && kWideRange * size >= std::min(range, felt);
+  return says ? size : reach > 0 && std::isfinite(reach) ? reach : size > 0 ? size : 1;
 }
 
 }  // namespace
@@ -84,14 +86,19 @@ double VariableScaling::Variable::rho_xx(double x) const {
   return 0;
 }
 
-VariableScaling::VariableScaling(const std::vector<Parameter>& parameters) {
+bool is_scaled_by_range(const Parameter& p) {
+  const bool is_within = p.lower && p.upper && std::abs(p.value) < range_of(p) / kWideRange;
+  return p.scale == ParameterScale::linear && (is_within || p.value == 0);
+}
+
+VariableScaling::VariableScaling(const std::vector<Parameter>& parameters, const Eigen::VectorXd& felt) {
   const Eigen::Index n = static_cast<Eigen::Index>(parameters.size());
   x_lower_.setConstant(n, -kInfinity), x_upper_.setConstant(n, kInfinity);
   rho_lower_.setConstant(n, -kInfinity), rho_upper_.setConstant(n, kInfinity);
   for (Eigen::Index k = 0; k < n; ++k) {
     const Parameter& p = parameters[static_cast<std::size_t>(k)];
     check(p);
-    const Variable variable{p.scale, linear_scale(p)};
+    const Variable variable{p.scale, linear_scale(p, felt.size() > 0 ? felt(k) : kInfinity)};
     if (p.lower) rho_lower_(k) = *p.lower, x_lower_(k) = variable.to_x(*p.lower);
     if (p.upper) rho_upper_(k) = *p.upper, x_upper_(k) = variable.to_x(*p.upper);
     variables_.push_back(variable);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <exception>
+#include <limits>
 #include <new>
 #include <utility>
 
@@ -25,6 +26,13 @@ bool is_finite(const NlpPoint& p, Wanted wanted) {
 bool is_better(double f, double violations, double than_f, double than_violations) {
   if (than_violations == 0) return violations == 0 && f < than_f;
   return violations < than_violations;
+}
+
+Eigen::VectorXd near_bounds(const Eigen::VectorXd& bounds, const Eigen::VectorXd& x) {
+  constexpr double kFar = 1e3;
+  return bounds.binaryExpr(x, [](double bound, double from) {
+    return std::abs(bound - from) > kFar ? std::copysign(std::numeric_limits<double>::infinity(), bound - from) : bound;
+  });
 }
 
 EvaluatedPoints::EvaluatedPoints(NonlinearProgram& problem, SolverOutcome& outcome, double constraint_tolerance,

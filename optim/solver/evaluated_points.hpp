@@ -57,6 +57,10 @@ class EvaluatedPoints {
   std::string last_error_;
 };
 
+// The bounds for a local search from x. Methods derive their first steps from bounds: asymptotes of mma, multipliers of
+// ipopt. Bounds that are far from variables of size 1 are infinite here; EvaluatedPoints keeps them.
+Eigen::VectorXd near_bounds(const Eigen::VectorXd& bounds, const Eigen::VectorXd& x);
+
 // Feasible before infeasible, less infeasible before more, then the lower objective. The violations are sums, 0 where
 // feasible.
 bool is_better(double f, double violations, double than_f, double than_violations);

@@ -81,7 +81,8 @@ class Adapter : public Ipopt::TNLP {
 
   bool get_bounds_info(Index n, Number* x_l, Number* x_u, Index m, Number* c_l, Number* c_u) override {
     auto finite = [](double bound) { return std::isfinite(bound) ? bound : std::copysign(kNoBound, bound); };
-    VectorView(x_l, n) = problem_.x_lower.unaryExpr(finite), VectorView(x_u, n) = problem_.x_upper.unaryExpr(finite);
+    VectorView(x_l, n) = near_bounds(problem_.x_lower, x_start_).unaryExpr(finite);
+    VectorView(x_u, n) = near_bounds(problem_.x_upper, x_start_).unaryExpr(finite);
     VectorView(c_l, m) = problem_.c_lower.unaryExpr(finite), VectorView(c_u, m) = problem_.c_upper.unaryExpr(finite);
     return true;
   }
@@ -430,6 +431,11 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
     if (!adapter->creeps() && !(ended && adapter->passed_a_better_point())) break;
     adapter->go_on_from_best();
   }
+  if (outcome.status == SolverStatus::converged && adapter->passed_a_better_point())
+    outcome = {SolverStatus::no_progress,
+               "no further progress: the search ends at worse points than the best one that it has passed, which is "
+               "the result; scale the problem, or give tighter bounds" +
+                   result.failures()};
   const double distance =
       adapter->finish(outcome.status == SolverStatus::converged || adapter->end() == SearchEnd::stalled);
   if (adapter->end() == SearchEnd::stalled) outcome = stalled_in_words(distance, result, options);

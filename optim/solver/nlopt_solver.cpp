@@ -160,8 +160,11 @@ class Adapter {
 
   // Sets bounds, and the sizes of steps and changes that end the search.
   void limit(nlopt_opt opt, const VectorXd& x_start) const {
-    nlopt_set_lower_bounds(opt, problem_.x_lower.data());
-    nlopt_set_upper_bounds(opt, problem_.x_upper.data());
+    // A global method searches between its bounds.
+    nlopt_set_lower_bounds(opt,
+                           method_.global ? problem_.x_lower.data() : near_bounds(problem_.x_lower, x_start).data());
+    nlopt_set_upper_bounds(opt,
+                           method_.global ? problem_.x_upper.data() : near_bounds(problem_.x_upper, x_start).data());
     const VectorXd size = x_start.cwiseAbs().cwiseMax(1);
     // With gradients, these decide on convergence; the steps only show that nothing moves any more.
     const VectorXd x_tolerance = (method_.gradients ? 1e-6 : 1.0) * options_.tolerance * size;

@@ -155,6 +155,42 @@ TEST_CASE("design and gradient warn of rounding in the derivatives of a tiny mec
   CHECK_THAT(designed.err, rounding);
 }
 
+// A bob of 3 kg on an arm of length r. The bounds are too wide to tell the size of r and of the shift z, which begins
+// at 0.
+TEST_CASE("design: loose bounds lead to the optimum of near ones, by every method", "[command]") {
+  const TemporaryFolder folder;
+  const auto problem = [&](double wide) {
+    return fmt::format(R"({{"format": 1, "name": "bob", "gravity": [0, -9.81, 0],
+      "parameters": {{"r": {{"value": 0.9, "lower": 0.02, "upper": {0}}}, "z": {{"value": 0, "lower": -{0}, "upper": {0}}}}},
+      "bodies": [{{"name": "arm", "mass": 3, "com": ["r", 0, 0], "inertia": [0.01, 0.01, 0.01]}}],
+      "joints": [{{"name": "pin", "type": "revolute", "body2": "arm", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}}],
+      "forces": [{{"name": "drag", "type": "rsda", "joint": "pin", "damping": 0.2}}],
+      "sensors": {{"q": {{"quantity": "angle", "joint": "pin"}}}},
+      "initial": {{"conditions": [{{"sensor": "q", "value": -0.5, "rate": 0}}]}}, "simulation": {{"end_time": 1.2}},
+      "objectives": {{"o": {{"running": "(q + 0.5 - z + 2.1*sin(2.2*t)^2)^2"}}}},
+      "design": {{"minimize": "o", "variables": ["r", "z"]}}}})",
+                       wide);
+  };
+  const auto solved = [&](double wide, const std::string& type) {
+    const std::string out = folder.file(fmt::format("{}{}", type, wide));
+    const CommandOutcome outcome = run_command({"design", folder.write("bob.json", problem(wide)), "--out", out,
+                                                "--set", "design.optimizer.type=\"" + type + "\""});
+    INFO(type << " " << wide << " " << outcome.err << outcome.out);
+    CHECK(outcome.exit_code == kDone);
+    return json_of(out + "/result.json");
+  };
+  const double best = solved(10, "ipopt").at("optimizer").at("objective_final");
+  for (const std::string type : {"ipopt", "slsqp", "mma", "ccsaq", "lbfgs"}) {
+    for (const double wide : {1e5, 1e12}) {
+      const auto result = solved(wide, type);
+      INFO(type << " " << wide);
+      CHECK(result.at("optimizer").at("status") == "converged");
+      CHECK(result.at("optimizer").at("objective_final").get<double>() == Approx(best).epsilon(1e-5));
+      for (const char* name : {"r", "z"}) CHECK(result.at("parameters").at(name).at("at_bound").is_null());
+    }
+  }
+}
+
 TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
   const TemporaryFolder folder;
   std::thread killer([] {

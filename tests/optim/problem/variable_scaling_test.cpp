@@ -53,6 +53,19 @@ TEST_CASE("a tiny value between wide bounds does not set the scale", "[scaling]"
   CHECK(scaling.x_lower()(0) == Approx(-50));
 }
 
+TEST_CASE("what is felt sets the scale where bounds are too wide to tell it", "[scaling]") {
+  const auto unit = [](double value, double upper, double felt) {
+    const VariableScaling scaling({variable("a", value, 0, upper, ParameterScale::linear)},
+                                  Eigen::VectorXd::Constant(1, felt));
+    return scaling.rho_x(Eigen::VectorXd::Zero(1))(0);
+  };
+  CHECK(unit(0.7, 1e9, 3) == 0.7);  // the value tells
+  CHECK(unit(0, 1e9, 3) == 3);
+  CHECK(unit(1e-9, 1e9, 3) == 3);
+  CHECK(unit(0, 50, 3) == 0.5);     // the range tells
+  CHECK(unit(0.7, 1e9, 0) == 0.7);  // not known
+}
+
 TEST_CASE("bounds go through the scale and are never left", "[scaling]") {
   const VariableScaling scaling(
       {variable("k", 120, 1, 1e4, ParameterScale::log), variable("L", 0.3, {}, 0.7, ParameterScale::linear)});
