@@ -6,12 +6,14 @@
 #include <cmath>
 
 #include "app/results/case_results.hpp"
+#include "app/starts/distinct_optima.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/starts/point_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/objective/case_evaluator.hpp"
 #include "optim/objective/case_objective.hpp"
+#include "optim/problem/load_cases.hpp"
 #include "optim/problem/start_points.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 
@@ -95,6 +97,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
   options.progress = [](const DesignRow&) { return !interrupted(); };
   options.scale = scale, options.mode = mode;
   options.compare_differences = false;  // once, at the best one's start
+  options.evaluate_stopped = false;     // a worker that is stopped must reply soon
   const DesignResult design = run_design(problem, options);
   const bool evaluated = !design.history.empty();
   Json record{{"start", start},
@@ -112,23 +115,35 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
   if (design.closing_steps > 0) record["closing_steps"] = design.closing_steps;
   for (const DesignVariable& v : design.variables)
     record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
+  if (is_an_optimum(record)) {
+    Problem reached = with_values(problem, record["parameters"]);
+    if (design.mode && !design.mode->bodies.empty()) reached.scene.bodies = design.mode->bodies;
+    for (const Problem& of_case : problems_of_cases(reached)) record["motion"].push_back(motion_of(of_case.scene));
+  }
   constexpr double kLong = 2e-3;  // [s] per point; a shorter one is sooner computed again than written and read
-  const bool is_long = design.wall_seconds > kLong * static_cast<double>(points.size());
+  const bool is_long = design.status == SolverStatus::stopped ||  // only its points lead to the same end again
+                       design.wall_seconds > kLong * static_cast<double>(points.size());
   record["points"] = is_long ? std::move(points) : Json::array();
   record["hessians"] = is_long ? std::move(hessians) : Json::array();
   return record;
 }
 
-// Repeats the run of a record from its points.
+// Repeats the run of a record from its points. A start that ended is repeated to its end, whatever interrupts. A start
+// that was stopped ends after its points. If it has none (TrackedSquares), it ends at the iterate of the record.
 DesignResult told_again(const Problem& problem, const NlpScale& scale, std::optional<int> mode, const Json& record) {
   JsonPointRecords records(record.at("points").get<std::vector<Json>>(), record.at("hessians").get<std::vector<Json>>(),
                            [](const char*, const Json&) {});
-  const auto go_on = [&] { return !interrupted() || !records.all_recalled(); };
+  const bool stopped = record.at("status").get<std::string>() == to_string(SolverStatus::stopped);
+  const bool unrecorded = record.at("points").empty();
   DesignOptions options;
   options.records = &records;
-  options.simulation_progress = [&](double) { return go_on(); };
-  options.progress = [&](const DesignRow&) { return go_on(); };
+  options.simulation_progress = [&](double) { return !stopped || unrecorded || !records.all_recalled(); };
+  options.progress = [&](const DesignRow& row) {
+    const Json reached = named_values(problem.design->variables, numbers(row.parameters));
+    return !stopped || (unrecorded ? reached != record.at("parameters") : !records.all_recalled());
+  };
   options.scale = scale, options.mode = mode;
+  options.compare_differences = !interrupted();
   return run_design(problem, options);
 }
 

@@ -95,7 +95,7 @@ void print(const std::vector<DistinctOptimum>& optima, const SearchedOptima& fou
 Json without_points(const Json& record) {
   Json short_record = Json::object();
   for (const auto& [key, value] : record.items())
-    if (key != "points" && key != "hessians") short_record[key] = value;
+    if (key != "points" && key != "hessians" && key != "motion") short_record[key] = value;
   return short_record;
 }
 

@@ -87,6 +87,7 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
     begin_with(result, more);
     if (!is_better) {
       take_counts(more, result);
+      if (more.status == SolverStatus::stopped) result.status = more.status, result.message = more.message;
       break;
     }
     more.history = joined_histories(std::move(result.history), std::move(more.history));

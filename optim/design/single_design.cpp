@@ -37,7 +37,10 @@ class SingleDesign {
  private:
   std::function<bool(double t)> until_abandoned() {
     if (!options_.simulation_progress) return {};
-    return [this](double t) { return abandoned_ = abandoned_ || !options_.simulation_progress(t), !abandoned_; };
+    return [this](double t) {
+      if (!is_describing_) abandoned_ = abandoned_ || !options_.simulation_progress(t);
+      return is_describing_ || !abandoned_;
+    };
   }
   long simulations() const { return prepared_.evaluator.simulations() + program_.hessian_gradients(); }
 
@@ -70,11 +73,14 @@ class SingleDesign {
     result_.rho = program_.rho_at(solution.x);
   }
 
+  // The end point of a stopped search is evaluated as well; nothing abandons that.
   void describe_last_point() {
     describe_end(prepared_.evaluator, program_, rounds_.solution, result_);
-    if (abandoned_ || rounds_.true_values.empty()) return;
+    if (abandoned_ && !options_.evaluate_stopped) return;
+    is_describing_ = true;
+    if (abandoned_ || rounds_.true_values.empty()) rounds_.true_values = prepared_.evaluator.true_values(result_.rho);
     describe_solution(program_, prepared_.scaling, rounds_, prepared_.spec.optimizer.tolerance, result_);
-    judge_solution(prepared_.spec, program_, prepared_.evaluator, result_);
+    if (!abandoned_) judge_solution(prepared_.spec, program_, prepared_.evaluator, result_);
   }
 
   void add_warnings() {
@@ -90,7 +96,7 @@ class SingleDesign {
 
   const Stopwatch stopwatch_;
   const DesignOptions& options_;
-  std::atomic<bool> abandoned_ = false;  // read by the threads of all cases
+  std::atomic<bool> abandoned_ = false, is_describing_ = false;  // read by the threads of all cases
   PreparedDesign prepared_;
   DesignProgram program_;
   DesignResult result_;

@@ -18,9 +18,9 @@
 
 namespace mbsopt {
 
-// A run in a process of its own that is killed as soon as its journal has so many lines of a kind.
+// A run in a process of its own that gets the signal as soon as its journal has so many lines of a kind.
 inline void kill_at(const std::vector<std::string>& arguments, const std::filesystem::path& folder,
-                    const std::string& key, long count) {
+                    const std::string& key, long count, int signal = SIGKILL) {
   const pid_t process = ::fork();
   if (process == 0) {
     std::ostringstream out, err;
@@ -31,7 +31,7 @@ inline void kill_at(const std::vector<std::string>& arguments, const std::filesy
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
     if (std::filesystem::exists(folder / kJournalFile) && journal_lines(folder, key) >= count) break;
   }
-  ::kill(process, SIGKILL);
+  ::kill(process, signal);
   int status = 0;
   ::waitpid(process, &status, 0);
 }

@@ -219,6 +219,101 @@ TEST_CASE("resume: a run that was interrupted keeps its best and goes on", "[res
   CHECK(outcome_of(out) == outcome_of(folder.path / "whole"));
 }
 
+TEST_CASE("a multistart that is interrupted gives the best of its waterfall", "[multistart]") {
+  const TemporaryFolder folder;
+  std::string text = kSwingingRod;
+  const bool tracked = GENERATE(false, true);
+  if (tracked) {  // points of solved runs are not recorded
+    text.replace(text.find("\"joints\""), 0, R"x("drives": [{"name": "motor", "type": "angle", "joint": "pin",
+      "law": "0.02*k + free*sin(3*t)"}], )x");
+    text.replace(text.find("{\"running\""), std::string::npos, R"({"track": [{"sensor": "tip_y", "file": "wish.csv",
+      "column": "y"}]}}, "design": {"minimize": "track", "variables": ["k", "free"], "optimizer": {"type": "least_squares"},
+      "multistart": {"starts": 4000, "seed": 5}}})");
+    std::string wish = "t,y\n";
+    for (int i = 0; i <= 10; ++i)
+      wish += std::to_string(0.1 * i) + "," + std::to_string(0.4 * std::sin(0.25 * i)) + "\n";
+    folder.write("wish.csv", wish);
+  }
+  const std::string file = folder.write("rod.json", text);
+  const fs::path out = folder.path / "out";
+  Arguments arguments{"design", file, "--out", out.string(), "--threads", "2"};
+  if (!tracked) arguments.insert(arguments.end(), {"--set", "simulation.integrator.max_step=1e-3"});
+  kill_at(arguments, out, "start", tracked ? 20 : 2, SIGINT);
+  const auto result = json_of(out / "result.json");
+  REQUIRE(result.at("status") == "interrupted");
+  const auto& best = result.at("multistart").at("waterfall").at(0);
+  CHECK(result.at("objectives").at("track").at("value") == best.at("objective"));
+  CHECK(result.at("optimizer").at("objective_final") == best.at("objective"));
+  for (const auto& [name, value] : best.at("parameters").items())
+    CHECK(result.at("parameters").at(name).at("value") == value);
+  std::vector<std::string> again{"simulate", (out / "optimized.json").string(), "--out", folder.file("again")};
+  if (!tracked) again.insert(again.end(), {"--set", "simulation.integrator.max_step=1e-3"});
+  REQUIRE(run_command(again).exit_code == kDone);
+  CHECK(json_of(folder.path / "again/result.json").at("objectives").at("track").at("value").get<double>() ==
+        Approx(best.at("objective").get<double>()).epsilon(1e-9));
+}
+
+TEST_CASE("a design of load cases that is interrupted gives the values of its best design in each", "[multistart]") {
+  const TemporaryFolder folder;
+  std::string text = kSwingingRod;
+  const std::size_t at = text.find("{\"running\"");  // an extreme takes another run for its true value
+  text.replace(at, text.find("}},", at) - at, R"({"maximum_of": "(tip_y + 0.2*sin(5*t))^2", "sharpness": 40)");
+  text.replace(text.find("\"design\""), std::string::npos, R"("cases": [{"name": "light", "overrides": {"k": "0.8*k"}},
+    {"name": "short", "end_time": 0.7}], "design": {"minimize": "track", "variables": ["k", "free"]}})");
+  const fs::path out = folder.path / "out";
+  kill_at(
+      {"design", folder.write("rod.json", text), "--out", out.string(), "--set", "simulation.integrator.max_step=1e-3"},
+      out, "iterate", 4, SIGINT);
+  const auto result = json_of(out / "result.json");
+  REQUIRE(result.at("status") == "interrupted");
+  REQUIRE(run_command({"simulate", (out / "optimized.json").string(), "--out", folder.file("again"), "--set",
+                       "simulation.integrator.max_step=1e-3"})
+              .exit_code == kDone);
+  const auto again = json_of(folder.path / "again/result.json");
+  for (const char* name : {"light", "short"}) {
+    const auto& track = result.at("cases").at(name).at("objectives").at("track");
+    CHECK(track.at("value") != track.at("initial"));
+    CHECK(track.at("value").get<double>() ==
+          Approx(again.at("cases").at(name).at("objectives").at("track").at("value").get<double>()).epsilon(1e-9));
+  }
+}
+
+// An arm of 0.6 m that begins at angle a and swings on. The mirrored design passes the same heights another way.
+TEST_CASE("optima that differ by whole turns are one, mirrored ones are two", "[multistart]") {
+  const TemporaryFolder folder;
+  const auto [miss, optima] =
+      GENERATE(table<std::string, std::size_t>({{"(x+0.36)^2 + (y-0.48)^2", 1}, {"(x+0.36)^2", 2}}));
+  const std::string file = folder.write("arm.json", R"({"format": 1, "name": "arm", "gravity": [0, -9.81, 0],
+    "parameters": {"a": {"value": 0.4, "lower": -6, "upper": 2.9, "unit": "rad"}},
+    "bodies": [{"name": "arm", "mass": 3, "inertia": [0.1, 0.1, 0.2], "points": {"tip": [0.6, 0, 0]}}],
+    "joints": [{"name": "pin", "type": "revolute", "body2": "arm", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
+    "drives": [{"name": "motor", "type": "angle", "joint": "pin", "law": "a + 0.3*t^2"}],
+    "sensors": {"x": {"quantity": "position", "body": "arm", "point": "tip", "component": "x"},
+                "y": {"quantity": "position", "body": "arm", "point": "tip", "component": "y"}},
+    "simulation": {"end_time": 0.5}, "objectives": {"miss": {"samples": [{"time": 0, "value": ")" +
+                                                        miss + R"("}]}},
+    "design": {"minimize": "miss", "variables": ["a"], "multistart": {"starts": 14, "seed": 4}}})");
+  REQUIRE(design(file, folder.file("out")).exit_code == kDone);
+  const auto result = json_of(folder.path / "out/result.json").at("multistart");
+  CHECK(result.at("optima").size() == optima);
+  std::set<long> turns;
+  for (const auto& record : result.at("waterfall"))
+    turns.insert(std::lround(10 * record.at("parameters").at("a").get<double>()));
+  CHECK(turns.size() > optima);
+  CHECK_FALSE(result.at("waterfall").at(0).contains("motion"));
+}
+
+TEST_CASE("more starts than a machine can run are refused before anything runs", "[multistart]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kSwingingRod);
+  for (const char* command : {"validate", "design"}) {
+    const CommandOutcome outcome =
+        run_command({command, file, "--out", folder.file("out"), "--set", "design.multistart.starts=40000000"});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains("design.multistart.starts: is 40000000, at most 1000000"));
+  }
+}
+
 TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
   const TemporaryFolder folder;
   CommandOutcome outcome = run_command({"resume", folder.path.string()});
