@@ -6,6 +6,7 @@
 #include "core/linear/dense.hpp"
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/mechanism/rounded_loops.hpp"
 #include "core/scene/scene_error.hpp"
 
 namespace mbsopt {
@@ -106,6 +107,7 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
   group_rows(model.data);
   scale_alpha(model.data);
   model.data.theta_rho = model.fields.theta_rho();
+  close_rounded_loops(model.data, scene.simulation.redundancy_tolerance);
   PlanarSearch plane = find_planar_model(scene, model.data);
   model.data.planar = std::move(plane.model);
   model.data.not_planar = std::move(plane.reason);

@@ -62,6 +62,14 @@ struct UserForceData {
   std::vector<int> bodies;  // 1-based
 };
 
+// The changes of points and axes with which redundant equations of loops agree (rounded_loops.hpp).
+struct RoundedLoops {
+  std::vector<int> joints;     // indices of those that change; empty: the equations agree
+  double shift = 0, turn = 0;  // the largest [m], [rad]
+  double part = 0;             // the largest of turns, and of shifts in lengths of the mechanism
+  bool made = false;           // part is within simulation.redundancy_tolerance
+};
+
 struct Constraint;   // core/constraint/constraint.hpp
 struct Forces;       // core/force/forces.hpp
 struct PlanarModel;  // planar_model.hpp
@@ -106,6 +114,7 @@ struct MechanismData {
   bool needs_motion = false;    // some sensor does
   bool equilibrium = false;     // start from static equilibrium
   int assembly_iterations = 0;  // at most
+  RoundedLoops rounded;
 
   Eigen::Index slots() const { return theta_rho.rows(); }
   // rho_bar (all parameters) += (d theta/d rho)' theta_bar

@@ -84,6 +84,7 @@ struct IntegratorSettings {
 struct SimulationSettings {
   double start_time = 0, end_time = 1;  // [s]
   std::optional<double> output_step;    // default: 200 rows
+  double redundancy_tolerance = 1e-5;   // of lengths and [rad]: rounding of joints in loops (rounded_loops.hpp)
   ModelChoice model = ModelChoice::automatic;
   Solve solve = Solve::automatic;
   FormulationSettings formulation;

@@ -451,6 +451,9 @@ void describe(auto& v, Like<SimulationSettings> auto& s) {
   v.plain("start_time", s.start_time, kAny, {"[s]", Need::optional, dimension::kTime});
   v.plain("end_time", s.end_time, kAny, {"[s]", Need::optional, dimension::kTime});
   v.plain("output_step", s.output_step, kPositive, {"of trajectory.csv [s]; 200 rows when absent"});
+  v.plain("redundancy_tolerance", s.redundancy_tolerance, kNotNegative,
+          {"rounding of points and axes (part of a length, rad) within which redundant equations of a loop are made to "
+           "agree; 0: numbers are exact"});
   v.choice("model", s.model, kModels,
            {"three unknowns per body (planar) or six (spatial); auto: planar where joints hold all bodies in a plane"});
   v.choice("solve", s.solve, kSolves,

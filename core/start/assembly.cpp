@@ -15,6 +15,7 @@
 #include "core/linear/row_dependence.hpp"
 #include "core/linear/sparse_projection.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/mechanism/rounded_loops.hpp"
 #include "core/projection/projection.hpp"
 #include "core/start/assembly_equations.hpp"
 #include "core/start/assembly_problems.hpp"
@@ -104,6 +105,7 @@ struct Assembly::Solution {
         position(data, AssemblyLevel::position, t),
         velocity(data, AssemblyLevel::velocity, t) {
     solve();
+    if (!result.ok && !data.rounded.made && !data.rounded.joints.empty()) result.message += "; " + in_words(data);
     set_angles();
   }
 
@@ -354,9 +356,9 @@ namespace {
 // Marks columns of right-hand sides b for which J x = b has no solution. `left` is the part of b that a solution
 // leaves, rows scaled to unit length. b is the sum of pieces, which may cancel.
 void note_unmet(const MatrixXd& left, const VectorXd& row_scale, std::initializer_list<MatrixXd> pieces,
-                std::vector<bool>& unmet) {
-  constexpr double kOpen = 1e-7;       // of b: assembly leaves a loop open by far less
-  constexpr double kRounding = 1e-12;  // of b, in the units of J: sin(pi) is not zero
+                const MechanismData& data, std::vector<bool>& unmet) {
+  const double kOpen = std::max(1e-7, 1e3 * data.rounded.part);  // of b: assembly leaves a loop open by far less
+  constexpr double kRounding = 1e-12;                            // of b, in the units of J: sin(pi) is not zero
   if (left.rows() == 0) return;
   for (Index k = 0; k < left.cols(); ++k) {
     double size = 0;
@@ -376,22 +378,22 @@ std::vector<int> Assembly::obstructed() const {
     const AssemblyEquations::Gradients F = s.position.gradients(s.result.y);
     const MatrixXd J = F.y.leftCols(N);
     const NearestPointLinearisation at(J, sizes_of_poses(J));
-    note_unmet(at.left(-F.rho), at.row_scale(), {F.rho}, unmet);
+    note_unmet(at.left(-F.rho), at.row_scale(), {F.rho}, s.data, unmet);
   } else if (s.is_sparse()) {
     const Solution::Sparse d = s.sparse_derivatives();
     const MatrixXd q_rho = d.q.solve(d.q_b_rho, d.q_g_rho);
-    note_unmet(d.q.left(d.q_b_rho, q_rho), d.q.row_scale(), {d.q_b_rho}, unmet);
+    note_unmet(d.q.left(d.q_b_rho, q_rho), d.q.row_scale(), {d.q_b_rho}, s.data, unmet);
     MatrixXd turned = MatrixXd::Zero(d.v_b_rho.rows(), P);
     for (const SparseEntry& e : d.v_b_q) turned.row(e.row) += e.value * q_rho.row(e.column);
     const MatrixXd b = turned + d.v_b_rho;
-    note_unmet(d.v.left(b, d.v.solve(b, d.v_g_rho)), d.v.row_scale(), {turned, d.v_b_rho}, unmet);
+    note_unmet(d.v.left(b, d.v.solve(b, d.v_g_rho)), d.v.row_scale(), {turned, d.v_b_rho}, s.data, unmet);
   } else {
     s.linearise_both();
     const Solution::Derivatives d = s.derivatives();
     const NearestPointLinearisation &q = s.q->linearisation, &v = s.v->linearisation;
-    note_unmet(q.left(d.q_b_rho), q.row_scale(), {d.q_b_rho}, unmet);
+    note_unmet(q.left(d.q_b_rho), q.row_scale(), {d.q_b_rho}, s.data, unmet);
     const MatrixXd turned = d.v_b_q * q.solve(d.q_b_rho, d.q_g_rho), b = turned + d.v_b_rho;
-    note_unmet(v.left(b), v.row_scale(), {turned, d.v_b_rho}, unmet);
+    note_unmet(v.left(b), v.row_scale(), {turned, d.v_b_rho}, s.data, unmet);
   }
   std::vector<int> parameters;
   for (Index k = 0; k < P; ++k) {

@@ -18,6 +18,7 @@
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/mechanism/reaction_sensor.hpp"
+#include "core/mechanism/rounded_loops.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/start/assembly_problems.hpp"
 
@@ -331,6 +332,7 @@ std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assemb
   std::vector<std::string> warnings;
   if (!assembly.result().ok) return warnings;
   const VectorXd q = assembly.result().y.head(StateLayout{d.n}.positions());
+  if (!d.rounded.joints.empty()) warnings.push_back(in_words(d));
   add_rounding(d, q, warnings);
   add_massless(d, q, warnings);
   add_springs(d, assembly.result().y, warnings);
