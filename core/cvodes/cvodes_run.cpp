@@ -242,7 +242,10 @@ bool ForwardRun::step_is_followed(double h, const Eigen::VectorXd& y) {
 Energy ForwardRun::update_statistics(double t, const Eigen::VectorXd& y) {
   SimulationStatistics& s = result_.statistics;
   const Eigen::VectorXd& angles = flow_.angles_at(t);
-  s.max_position_violation = std::max(s.max_position_violation, violations_->position_violation(t, angles, y));
+  double relative = 0;
+  s.max_position_violation =
+      std::max(s.max_position_violation, violations_->position_violation(t, angles, y, &relative));
+  s.relative_position_violation = std::max(s.relative_position_violation, relative);
   s.max_velocity_violation = std::max(s.max_velocity_violation, violations_->velocity_violation(t, y));
   const Energy e = energy(mechanism_.data(), y, angles);
   s.energy_final = e.kinetic + e.potential;

@@ -281,7 +281,9 @@ void DrivenRun::end_panel(double t0, double t1) {
   ++s.steps;
   result_.steps.times.push_back(t0), result_.steps.sizes.push_back(t1 - t0);
   result_.last_good_time = t1;
-  s.max_position_violation = std::max(s.max_position_violation, path_.position_violation());
+  double relative = 0;
+  s.max_position_violation = std::max(s.max_position_violation, path_.position_violation(&relative));
+  s.relative_position_violation = std::max(s.relative_position_violation, relative);
   s.max_velocity_violation = std::max(s.max_velocity_violation, path_.velocity_violation());
   const Energy e = energy(mechanism_.data(), path_.state().y, path_.state().angles);
   s.energy_final = e.kinetic + e.potential;

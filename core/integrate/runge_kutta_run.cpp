@@ -52,9 +52,11 @@ double RungeKuttaRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
 
 Energy RungeKuttaRun::update_statistics(SimulationResult& result) {
   SimulationStatistics& s = result.statistics;
-  s.max_position_violation =
-      std::max(s.max_position_violation,
-               attempt_.projector->position_violation(attempt_.step.t1, attempt_.step.angles1, attempt_.step.y1));
+  double relative = 0;
+  s.max_position_violation = std::max(
+      s.max_position_violation,
+      attempt_.projector->position_violation(attempt_.step.t1, attempt_.step.angles1, attempt_.step.y1, &relative));
+  s.relative_position_violation = std::max(s.relative_position_violation, relative);
   s.max_velocity_violation =
       std::max(s.max_velocity_violation, attempt_.projector->velocity_violation(attempt_.step.t1, attempt_.step.y1));
   const Energy e = energy(mechanism_.data(), attempt_.step.y1, attempt_.step.angles1);

@@ -76,6 +76,10 @@ void scale_alpha(MechanismData& data) {
     data.row_alpha.segment(c.row, c.rows()).array() +=
         c.factor * c.factor * seen * (quantity == RowQuantity::euler_parameter ? 0.25 : 1.0);
   }
+  const double length = joint_lengths(data).whole;
+  data.row_size.setOnes(data.m);
+  for (const Constraint& c : data.constraints)
+    if (c.quantity() == RowQuantity::length) data.row_size.segment(c.row, c.rows()).setConstant(length);
   // A factor of zero leaves a row without inertia; any alpha is then right.
   data.row_alpha = (data.row_alpha.array() > 0).select(data.row_alpha.array().inverse(), 1.0);
 }

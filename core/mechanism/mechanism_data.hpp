@@ -114,6 +114,7 @@ struct MechanismData {
   bool needs_motion = false;    // some sensor does
   bool equilibrium = false;     // start from static equilibrium
   int assembly_iterations = 0;  // at most
+  Eigen::VectorXd row_size;     // per row: the mechanism's length for a length [m], else 1
   RoundedLoops rounded;
 
   Eigen::Index slots() const { return theta_rho.rows(); }

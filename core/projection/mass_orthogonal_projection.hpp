@@ -30,7 +30,8 @@ ProjectorOf<Body>::ProjectorOf(const Mechanism& mechanism, Projection what, Free
       solver_(data_, kProjectionAlpha * rows_of<Space>(data_, data_.row_alpha)),
       rows_(data_),
       constraints_(data_),
-      laws_(Space::laws(data_)) {
+      laws_(Space::laws(data_)),
+      row_size_(rows_of<Space>(data_, data_.row_size)) {
   const std::size_t n = at(data_.n);
   const Eigen::Index m = rows_.count();
   for (int i = 1; i <= data_.n; ++i) bodies_.emplace_back(data_, i, positions());
@@ -119,13 +120,15 @@ void ProjectorOf<Body>::response(Y& out) {
 }
 
 template <class Body>
-double ProjectorOf<Body>::position_violation(double t, const Y& angles, const Y& y) {
+double ProjectorOf<Body>::position_violation(double t, const Y& angles, const Y& y, double* relative) {
   laws_.set_time(t);
   for_bodies([&](Body& b, std::size_t, auto& f) { b.read_position(y, f); });
   constraints_.phi(frames_, laws_, angles, phi_);
-  double worst = constrained() ? phi_.cwiseAbs().maxCoeff() : 0.0;
-  for (const Body& b : bodies_) worst = std::max(worst, b.norm_violation());
-  return worst;
+  double of_norms = 0;
+  for (const Body& b : bodies_) of_norms = std::max(of_norms, b.norm_violation());
+  if (relative)
+    *relative = constrained() ? std::max(phi_.cwiseQuotient(row_size_).cwiseAbs().maxCoeff(), of_norms) : of_norms;
+  return constrained() ? std::max(phi_.cwiseAbs().maxCoeff(), of_norms) : of_norms;
 }
 
 template <class Body>

@@ -59,8 +59,10 @@ class Projector {
   // 1/d^3 in the directions that become free, d the distance from it, and change sign there.
   virtual void response(Eigen::VectorXd& out) = 0;
 
-  // The largest violations at y: those of Phi and the unit norms, and those of their rates.
-  virtual double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) = 0;
+  // The largest violations at y: those of Phi and the unit norms, and those of their rates. `relative` receives that of
+  // positions with lengths in units of the mechanism's.
+  virtual double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y,
+                                    double* relative = nullptr) = 0;
   virtual double velocity_violation(double t, const Eigen::VectorXd& y) = 0;
   virtual long factorisations() const = 0;
 

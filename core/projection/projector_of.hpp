@@ -40,7 +40,8 @@ class ProjectorOf final : public Projector {
   void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar) override;
   void response(Eigen::VectorXd& out) override;
-  double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) override;
+  double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y,
+                            double* relative) override;
   double velocity_violation(double t, const Eigen::VectorXd& y) override;
   long factorisations() const override { return solver_.factorisations() + square_factorisations_; }
 
@@ -92,6 +93,7 @@ class ProjectorOf final : public Projector {
   Frames frames_, frames_tilde_;
   std::vector<X> delta_, u_, b_, x_;
   Y nu_, kappa_, phi_, g_, mu_;
+  const Y row_size_;
   Corrections<X, Y> corrections_;
   std::vector<typename Space::FrameBar> bars_;
   std::vector<Gradient> q_bars_, v_bars_;

@@ -53,6 +53,7 @@ struct SimulationStatistics {
   long factor_blocks = 0, linearised_states = 0;
   double wall_seconds = 0;
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
+  double relative_position_violation = 0;                         // the same, lengths in units of the mechanism's
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
   double relative_energy_drift = 0;      // of the largest energy so far, if nothing does work; else 0

@@ -10,9 +10,10 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kApart = 1e-3;  // [m, -]
-// [m, -]: projections leave 1e-11 and less, the rounding of coordinates up to 1e4 m. Where rows contradict each other,
-// they give up below 1e-8 (projection_solution.hpp) at the first step.
+// Violations of rows, lengths in units of the mechanism's. Projections leave 1e-11 and less, the rounding of
+// coordinates up to 1e4 lengths. Where rows contradict each other, they give up below 1e-8 (projection_solution.hpp) at
+// the first step.
+constexpr double kApart = 1e-3;
 constexpr double kContradicting = 1e-10;
 constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
 constexpr double kGivingWay = 1e-8;        // of the accelerations; gradients had errors of 500 times as much
@@ -38,7 +39,7 @@ Warning rounding_of_penalty(const SimulationSettings& settings) {
 }
 
 Warning joints_apart(const SimulationSettings& settings, const SimulationStatistics& statistics) {
-  if (!(statistics.max_position_violation > kApart)) return {};
+  if (!(statistics.relative_position_violation > kApart)) return {};
   const std::string advice =
       is_penalty(settings)
           ? fmt::format(
@@ -53,7 +54,7 @@ Warning joints_apart(const SimulationSettings& settings, const SimulationStatist
 }
 
 Warning energy_lost(const SimulationSettings& settings, const SimulationStatistics& statistics) {
-  if (!(statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart)) return {};
+  if (!(statistics.relative_energy_drift > kEnergyLost && statistics.relative_position_violation <= kApart)) return {};
   return fmt::format(
       "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
       "motion of the scene. {}{}",
@@ -96,7 +97,7 @@ Warning joints_give_way(const SimulationSettings& settings, const SimulationStat
 
 Warning contradicting_joints(const SimulationSettings& settings, const SimulationStatistics& statistics) {
   const bool projects = settings.formulation.projection == Projection::position_velocity && !by_cvodes(settings);
-  if (!projects || !(statistics.max_position_violation > kContradicting)) return {};
+  if (!projects || !(statistics.relative_position_violation > kContradicting)) return {};
   return fmt::format(
       "the equations of the joints contradict each other by {:.1e} [m, -], which no projection takes out: some of them "
       "nearly depend on each other, as where axes in a closed loop are parallel but for a few digits. Which motions "

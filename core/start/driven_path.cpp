@@ -15,7 +15,7 @@ using Eigen::Index;
 constexpr double kLargestTurn = 0.1;         // of an Euler parameter in one step
 constexpr double kRelativeCorrection = 0.2;  // of the predictor, against h v
 constexpr double kSmallCorrection = 1e-6;    // always accepted
-constexpr double kViolation = 1e-9;
+constexpr double kViolation = 1e-9;          // of the mechanism's length, or of 1
 
 }  // namespace
 
@@ -47,7 +47,9 @@ bool DrivenPath::advance(double h, double t1) {
   y_hat_.tail(half) = state_.y.tail(half) + h * state_.a;
   if (!projector_->settle(t1, state_.angles, y_hat_, y_next_)) return false;
   if (!keeps_branch(h)) return false;
-  if (projector_->position_violation(t1, state_.angles, y_next_) > kViolation) return false;
+  double violation = 0;
+  projector_->position_violation(t1, state_.angles, y_next_, &violation);
+  if (violation > kViolation) return false;
   state_.t = t1;
   state_.a = (y_next_.tail(half) - state_.y.tail(half)) / h;
   state_.y = y_next_;

@@ -45,7 +45,9 @@ class DrivenPath {
   // The path then keeps the last accepted state.
   bool go_to(double t1, double shortest, long most);
 
-  double position_violation() { return projector_->position_violation(state_.t, state_.angles, state_.y); }
+  double position_violation(double* relative = nullptr) {
+    return projector_->position_violation(state_.t, state_.angles, state_.y, relative);
+  }
   double velocity_violation() { return projector_->velocity_violation(state_.t, state_.y); }
   // Serves derivatives at a state. The path keeps nothing in it between its steps.
   Projector& projector() { return *projector_; }

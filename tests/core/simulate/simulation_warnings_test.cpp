@@ -20,9 +20,9 @@ TEST_CASE("a penalty that leaves the joints to the projections is said, with alp
 TEST_CASE("joints that contradict each other by more than rounding are said", "[simulate]") {
   Scene scene;
   SimulationStatistics statistics;
-  statistics.max_position_violation = 1e-12;
+  statistics.relative_position_violation = 1e-12, statistics.max_position_violation = 1e-6;  // in micrometres
   CHECK(simulation_warnings(scene, statistics).empty());
-  statistics.max_position_violation = 1e-8;
+  statistics.relative_position_violation = statistics.max_position_violation = 1e-8;
   const std::vector<std::string> warnings = simulation_warnings(scene, statistics);
   REQUIRE(warnings.size() == 1);
   CHECK_THAT(warnings[0], Catch::Contains("contradict each other by 1.0e-08"));
