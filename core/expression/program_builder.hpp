@@ -14,6 +14,7 @@
 
 namespace mbsopt {
 
+struct Range;            // program_range.hpp
 struct SampledFunction;  // sampled_functions.hpp
 
 // Turns a tree and its definitions into instructions. Equal sub-expressions become one (value numbering), and constants
@@ -30,10 +31,13 @@ class ProgramBuilder {
   // The derivative of another program in one of its inputs, by the chain rule applied to each instruction.
   void build_derivative(const Program& of, int input);
 
-  static std::vector<Program> switches_of(const Program& program);                   // program_switches.hpp
-  static std::vector<SampledFunction> sampled_functions_of(const Program& program);  // sampled_functions.hpp
-  // Builds the first of two instructions of another program (how: name), its cosine (cos) or their difference
-  // (subtract).
+  static std::vector<Program> switches_of(const Program& program);                              // program_switches.hpp
+  static std::vector<SampledFunction> sampled_functions_of(const Program& program);             // sampled_functions.hpp
+  static std::vector<Program> time_parts_of(const Program& program, int parameters, int time);  // time_parts.hpp
+  static std::vector<int> terms_of(const Program& part, int time);                              // time_parts.cpp
+  static void ranges_of(const Program& program, std::span<const Range> x, std::vector<Range>& range);
+  // Builds the first of two instructions of another program (how: name), its cosine (cos), its reciprocal (divide) or
+  // their difference (subtract).
   void build_switch(const Program& of, Operation how, int a, int b);
 
  private:

@@ -8,7 +8,7 @@
 
 namespace mbsopt {
 
-// how selects cos of a, a - b (subtract), or a itself (name).
+// how selects cos of a, 1/a (divide), a - b (subtract), or a itself (name).
 void ProgramBuilder::build_switch(const Program& of, Operation how, int a, int b) {
   const std::size_t size = static_cast<std::size_t>(std::max(a, b)) + 1;
   std::vector<char> needed(size, 0);
@@ -29,6 +29,7 @@ void ProgramBuilder::build_switch(const Program& of, Operation how, int a, int b
   }
   const int first = at[static_cast<std::size_t>(a)];
   keep_only_what_reaches(how == Operation::cos        ? operation(how, first, -1)
+                         : how == Operation::divide   ? operation(how, number(1), first)
                          : how == Operation::subtract ? operation(how, first, at[static_cast<std::size_t>(b)])
                                                       : first);
 }
