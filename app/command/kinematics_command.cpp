@@ -43,11 +43,12 @@ struct DriveEfforts {
       table.columns.push_back(d.drive_names[static_cast<std::size_t>(law.drive)]);
     }
   }
-  // Keeps the efforts if they are finite, and returns whether they are.
+  // Keeps the efforts if they are finite, and returns whether they are. A NaN has no limit at a singular position.
   bool record(const StatePoint& at) {
     std::vector<double> row{at.t};
     const Motion& motion = at.motion->motion(at);
     for (const int r : rows) row.push_back(-motion.lambda(r));
+    if (std::ranges::any_of(row, [](double x) { return std::isnan(x); })) return true;
     if (!std::ranges::all_of(row, [](double x) { return std::isfinite(x); })) return false;
     table.rows.push_back(std::move(row));
     return true;
@@ -74,15 +75,8 @@ void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
 // Returns their times, for the plots.
 std::vector<PlotInstant> add_singular(Run& run, const KinematicsResult& kinematics) {
   std::vector<PlotInstant> instants;
-  for (const SingularPosition& s : kinematics.singular) {
-    const std::string owners =
-        s.owners.empty() ? std::string() : fmt::format(", between {}", fmt::join(s.owners, ", "));
-    run.warn(
-        fmt::format("singular position at t = {:.6g} s: {} equation{} lost{}; velocities, accelerations "
-                    "and forces are not settled there",
-                    s.t, s.rank_lost, s.rank_lost == 1 ? " is" : "s are", owners));
-    instants.push_back({"singular", s.t});
-  }
+  if (const std::string words = in_words(kinematics.singular, {}); !words.empty()) run.warn(words);
+  for (const SingularPosition& s : kinematics.singular) instants.push_back({"singular", s.t});
   return instants;
 }
 

@@ -50,7 +50,7 @@ JointForces::~JointForces() = default;
 void JointForces::observe(std::size_t i, const StatePoint& at) {
   if (i % stride_ != 0 && i + 1 != instants_) return;
   StatePoint here = at;
-  here.motion = motion_.get();
+  here.motion = at.motion ? at.motion : motion_.get();  // the laws and rows of both mechanisms are the same
   std::vector<double> row{at.t};
   for (int sensor = first_; sensor < mechanism_.sensors(); ++sensor)
     row.push_back(mechanism_.sensor_value(sensor, here));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/integrate/model_choice.hpp"
@@ -43,7 +44,10 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
       differentiated_(differentiated),
       shortest_(1e-9 * std::max(1e-3, settings.end_time - settings.start_time)),
       absolute_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.size()))) {
-  if (mechanism.data().needs_motion) motion_.emplace(mechanism, settings.formulation);
+  if (mechanism.data().needs_motion) {
+    motion_.emplace(mechanism, settings.formulation);
+    continued_.emplace(*motion_, [this](double t) { return window_at(t); });
+  }
   result_.psi.setZero(static_cast<Eigen::Index>(costs.size()));
   result_.last_good_time = settings.start_time;
   result_.y_initial = start.result().y;
@@ -54,7 +58,11 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
   if (!running_.empty()) nodes_.resize(kNodes);
   g_.resize(running_.size() * kNodes);
   integrals_.resize(running_.size()), errors_.resize(running_.size());
-  path_.start(settings.start_time, start.result().y, start.result().angles);
+  path_.start(settings.start_time, settings.end_time, start.result().y, start.result().angles);
+  path_.set_watch([&d = mechanism_.data(), differentiated](const DrivenState& from, const DrivenState& to) {
+    std::string words = past_half_turn(d, from.y, to.t, to.y);
+    return words.empty() && differentiated ? through_zero_length(d, from.t, from.y, to.t, to.y) : words;
+  });
 }
 
 void DrivenRun::stop(SimulationStatus status, const std::string& message) {
@@ -63,13 +71,14 @@ void DrivenRun::stop(SimulationStatus status, const std::string& message) {
 
 bool DrivenRun::go_to(double t) { return path_.go_to(t, shortest_, kMostStepsOfStretch); }
 
-std::string DrivenRun::why_it_ends() {
+void DrivenRun::stop_where_it_ends() {
+  if (!path_.objection().empty()) return stop(SimulationStatus::not_credible, path_.objection());
   const DrivenState& s = path_.state();
   // The interval over which a jump is measured; it is long against the rounding of times.
   const double beside = 1e-3 * (settings_.end_time - settings_.start_time);
   const std::string jump =
       law_jumps_.between(std::max(s.t - beside, settings_.start_time), std::min(s.t + beside, settings_.end_time));
-  return jump.empty() ? why_stuck(mechanism_, s.t, s.y) : jump;
+  stop(SimulationStatus::step_too_small, jump.empty() ? why_stuck(mechanism_, s.t, s.y) : jump);
 }
 
 SimulationResult DrivenRun::finish() {
@@ -84,7 +93,9 @@ void DrivenRun::go(const Take& take) {
   result_.y_end = path_.state().y;
   if (!result_.ok()) return;
   if (!take_terminal_costs(take)) return stop_at_singular_matrix();
-  if (!result_.psi.allFinite()) stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi));
+  if (result_.psi.allFinite()) return;
+  const std::string singular = in_words(result_.statistics.singular, {});
+  stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi) + (singular.empty() ? "" : "; " + singular));
 }
 
 // A Course holds what one panel of a run leaves to the next.
@@ -101,7 +112,7 @@ void DrivenRun::go_through_panels(const Take& take) {
   Course course{EventTimes(settings_.events, settings_.start_time, end), {}, end - settings_.start_time};
   const StepSequence* const frozen = options_.frozen;
   if (differentiated_ && !frozen) {
-    course.jumps.emplace(mechanism_, settings_, costs_, motion_ ? &*motion_ : nullptr);
+    course.jumps.emplace(mechanism_, settings_, costs_, continued());
     course.jumps->begin(point());
   }
   while (path_.state().t < end) {
@@ -113,7 +124,7 @@ void DrivenRun::go_through_panels(const Take& take) {
       try_shorter(course, outcome, t, t1);
       continue;
     }
-    if (outcome == Panel::stuck) return stop(SimulationStatus::step_too_small, why_it_ends());
+    if (outcome == Panel::stuck) return stop_where_it_ends();
     if (path_.steps() > settings_.integrator.max_steps) {
       return stop(
           SimulationStatus::too_many_steps,
@@ -127,8 +138,8 @@ void DrivenRun::go_through_panels(const Take& take) {
     }
     end_panel(t, t1);
     const double resume = course.events.reached(t1) ? course.events.resume_time() : t1;
-    if (const std::string objection = objection_to(t, t1, resume); !objection.empty()) {
-      return stop(SimulationStatus::not_credible, objection);
+    if (const std::string jump = options_.frozen ? std::string() : law_jumps_.between(t, resume); !jump.empty()) {
+      return stop(SimulationStatus::not_credible, jump);
     }
     if (course.jumps) course.jumps->look_at(point());
     if (options_.after_step) options_.after_step(point());
@@ -139,7 +150,7 @@ void DrivenRun::go_through_panels(const Take& take) {
     course.h *= 2;
     const bool given = frozen && course.panel < frozen->times.size();
     if (!go_to(given ? frozen->times[course.panel] : frozen ? t1 : resume)) {
-      return stop(SimulationStatus::step_too_small, why_it_ends());
+      return stop_where_it_ends();
     }
   }
   if (course.jumps) course.jumps->add_to(result_.statistics);
@@ -172,13 +183,6 @@ void DrivenRun::try_shorter(Course& course, Panel outcome, double t, double t1) 
   course.h = ends ? reached - t : (t1 - t) / 2;
 }
 
-// Why the motion from t to t1 is not to be believed; the run goes on at `resume`.
-std::string DrivenRun::objection_to(double t, double t1, double resume) {
-  std::string jump = options_.frozen ? std::string() : law_jumps_.between(t, resume);
-  if (!jump.empty() || !differentiated_) return jump;
-  return through_zero_length(mechanism_.data(), t, from_.y, t1, path_.state().y);
-}
-
 void DrivenRun::stop_at_singular_matrix() {
   stop(SimulationStatus::not_finite,
        fmt::format("the derivatives met a matrix that cannot be factored at t = {:.6g} s: a singular position?",
@@ -206,13 +210,19 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     if (!go_to(t + kronrod_rule().nodes[k] * h)) return Panel::stuck;
     nodes_[k] = path_.state();
-    for (std::size_t r = 0; r < running_.size(); ++r) g_[r * kNodes + k] = running_[r].cost->value(point_of(nodes_[k]));
+    for (std::size_t r = 0; r < running_.size(); ++r) g_[r * kNodes + k] = value_of(running_[r], point_of(nodes_[k]));
   }
   if (!go_to(t1)) return Panel::stuck;
   const IntegratorSettings& s = settings_.integrator;
   for (std::size_t r = 0; r < running_.size(); ++r) {
-    const PanelIntegral I = integrals_[r] = integrate_panel(std::span(g_).subspan(r * kNodes, kNodes), h);
-    if (options_.frozen || h <= shortest_) continue;
+    std::array<double, kNodes> g;
+    double shortest = shortest_;
+    for (std::size_t k = 0; k < kNodes; ++k) {
+      g[k] = g_[r * kNodes + k];
+      if (is_left_out(g[k], nodes_[k].t)) g[k] = 0, shortest = window_at(nodes_[k].t)->half;
+    }
+    const PanelIntegral I = integrals_[r] = integrate_panel(g, h);
+    if (options_.frozen || h <= shortest) continue;
     // Exponentials of smooth extremes have any size, so atol does not apply to them.
     const bool is_extreme = costs_[static_cast<std::size_t>(running_[r].objective)].is_extreme;
     const double of_panel = s.rtol * I.absolute + (is_extreme ? 0 : s.atol * h);
@@ -220,6 +230,30 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
     if (I.error > std::max(of_panel, of_run)) return Panel::refused;  // the end of the run reports NaN
   }
   return Panel::accepted;
+}
+
+// The value of a term, which is NaN if it has no limit at a singular position.
+double DrivenRun::value_of(const DrivenTerm& term, const StatePoint& at) {
+  const double g = term.cost->value(at);
+  if (is_left_out(g, at.t))
+    singular_at(at.t).note("objective '" + costs_[static_cast<std::size_t>(term.objective)].name + "'");
+  return g;
+}
+
+SingularPosition& DrivenRun::singular_at(double t) {
+  std::vector<SingularPosition>& known = result_.statistics.singular;
+  const SingularWindow& w = *window_at(t);
+  const auto same = std::ranges::find(known, w.t, &SingularPosition::t);
+  if (same != known.end()) return *same;
+  known.push_back(singular_position(mechanism_, w.t, w.state_at(w.t).y, w.half));
+  return known.back();
+}
+
+// Notes that a state which is asked for cannot be continued smoothly past a singular position.
+void DrivenRun::note_uncertain() {
+  std::vector<SingularPosition>& known = result_.statistics.singular;
+  if (!path_.is_uncertain() || std::ranges::count(known, 0.0, &SingularPosition::half) > 0) return;
+  known.push_back(singular_position(mechanism_, path_.state().t, path_.state().y, 0));
 }
 
 bool DrivenRun::take_panel(double t1, const Take& take) {
@@ -231,8 +265,13 @@ bool DrivenRun::take_panel(double t1, const Take& take) {
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     if (!take_events_until(nodes_[k].t, events, take)) return false;
     path_.start(nodes_[k]);
-    for (DrivenTerm& term : running_) term.weight = (t1 - from_.t) * kronrod_rule().kronrod[k];
-    if (take && !take(point(), running_)) return false;
+    note_uncertain();
+    at_instant_.clear();
+    for (std::size_t r = 0; r < running_.size(); ++r) {
+      running_[r].weight = (t1 - from_.t) * kronrod_rule().kronrod[k];
+      if (!is_left_out(g_[r * kNodes + k], nodes_[k].t)) at_instant_.push_back(running_[r]);
+    }
+    if (take && !take(point(), at_instant_)) return false;
   }
   for (std::size_t r = 0; r < running_.size(); ++r) {
     const PanelIntegral& I = integrals_[r];
@@ -250,14 +289,18 @@ bool DrivenRun::take_events_until(double t, std::span<const SampleEvent>& events
   while (!events.empty() && events.front().time <= t) {
     const double time = events.front().time;
     if (!go_to(time)) {
-      stop(SimulationStatus::step_too_small, why_it_ends());
+      stop_where_it_ends();
       return false;
     }
+    note_uncertain();
     at_instant_.clear();
     for (; !events.empty() && events.front().time == time; events = events.subspan(1)) {
       const SampleEvent& e = events.front();
-      if (e.cost) result_.psi(e.objective) += e.cost->value(point());
       at_instant_.push_back({e.cost, e.objective, 1, e.index});
+      if (e.cost)
+        result_.psi(e.objective) += value_of(at_instant_.back(), point());
+      else if (window_at(time) && continued_)
+        for (const std::string& name : lacking_sensors(mechanism_, point())) singular_at(time).note(name);
     }
     if (take && !take(point(), at_instant_)) return false;
   }
@@ -268,9 +311,10 @@ bool DrivenRun::take_terminal_costs(const Take& take) {
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     const PointCost* const cost = costs_[o].terminal.get();
     if (!cost) continue;
+    note_uncertain();
     const Eigen::Index objective = static_cast<Eigen::Index>(o);
-    result_.psi(objective) += cost->value(point());
     const DrivenTerm term{cost, objective, 1, 0};
+    result_.psi(objective) += value_of(term, point());
     if (take && !take(point(), std::span(&term, 1))) return false;
   }
   return true;

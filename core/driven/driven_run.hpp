@@ -7,6 +7,7 @@
 // The panels are the steps of the result: given again (RunOptions::frozen), they make psi a smooth function of rho.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <span>
@@ -47,6 +48,11 @@ class DrivenRun {
   SimulationResult finish();
   Model model() const { return model_; }
   Projector& projector() { return path_.projector(); }
+  const SingularWindow* window_at(double t) const { return path_.window_at(t); }
+  const std::vector<SingularWindow>& windows() const { return path_.windows(); }
+  ContinuedMotion* continued() { return continued_ ? &*continued_ : nullptr; }  // null if no sensor needs it
+  // The entry of the statistics for the window that contains t.
+  SingularPosition& singular_at(double t);
 
  private:
   enum class Panel { accepted, refused, stuck };
@@ -58,7 +64,6 @@ class DrivenRun {
   double frozen_end(const Course& course) const;
   double next_end(Course& course, double t) const;
   void try_shorter(Course& course, Panel outcome, double t, double t1);
-  std::string objection_to(double t, double t1, double resume);
   Panel try_panel(double t1);
   double largest_panel() const;
   bool take_panel(double t1, const Take& take);
@@ -69,9 +74,12 @@ class DrivenRun {
   void stop(SimulationStatus status, const std::string& message);
   void stop_at_singular_matrix();
   bool go_to(double t);
-  std::string why_it_ends();  // the reason why the path cannot continue
+  void stop_where_it_ends();  // with the reason why the path cannot continue
   StatePoint point() { return point_of(path_.state()); }
-  StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, motion_ ? &*motion_ : nullptr}; }
+  StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, continued()}; }
+  double value_of(const DrivenTerm& term, const StatePoint& at);
+  void note_uncertain();
+  bool is_left_out(double g, double t) const { return std::isnan(g) && window_at(t); }
 
   const Mechanism mechanism_;
   const SimulationSettings& settings_;
@@ -80,6 +88,7 @@ class DrivenRun {
   const Model model_;
   DrivenPath path_;
   std::optional<MotionSolver> motion_;  // set if a sensor needs it
+  std::optional<ContinuedMotion> continued_;
   SampleSchedule schedule_;
   LawJumps law_jumps_;
   const bool differentiated_;

@@ -78,10 +78,11 @@ bool moves_out_of_plane(const MechanismData& d) {
 // projection.
 class DrivenDerivatives {
  public:
-  DrivenDerivatives(const Mechanism& mechanism, Projector& projector)
+  DrivenDerivatives(const Mechanism& mechanism, DrivenRun& run)
       : data_(mechanism.data()),
-        projector_(projector),
-        unmoved_(projector.solution()),
+        run_(run),
+        projector_(run.projector()),
+        unmoved_(projector_.solution()),
         blocks_(parameter_blocks(data_)),
         y_bar_(Eigen::VectorXd::Zero(mechanism.states())),
         rho_bar_(Eigen::VectorXd::Zero(data_.rho.size())),
@@ -89,9 +90,68 @@ class DrivenDerivatives {
     y0_dir_.setZero(mechanism.states(), kLanes), direction_ = y0_dir_;
   }
 
+  // Sets y_rho at a point, y0_rho: dy0/drho. Within a singular window it is the sum over its nodes that the state is.
+  // Returns false if J is singular.
+  bool set_y_rho(const StatePoint& at, const Eigen::MatrixXd& y0_rho, bool velocities) {
+    const SingularWindow* const w = run_.window_at(at.t);
+    if (!w) return linearise(at) && find_y_rho(y0_rho, velocities);
+    tangents_.clear();
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(y_rho_.rows(), y_rho_.cols());
+    const bool regular = w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
+      if (!linearise({node.t, node.y, node.angles}) || !find_y_rho(y0_rho, velocities)) return false;
+      tangents_.push_back(y_rho_);
+      sum += weight * y_rho_;
+      return true;
+    });
+    y_rho_ = sum;
+    if (run_.continued()) run_.continued()->tangents = tangents_;
+    return regular;
+  }
   bool linearise(const StatePoint& at) { return projector_.linearise(at.t, at.angles, at.y, at.y, unmoved_); }
-  // y0_rho: dy0/drho
-  const Eigen::MatrixXd& y_rho(const Eigen::MatrixXd& y0_rho, bool velocities) {
+  // Names the parameters in which the positions at the nodes of a window have a pole, in the statistics.
+  void note_parameters(const Eigen::MatrixXd& y0_rho) {
+    constexpr double kPole = 1e-2;      // of the roughness, far above that of smooth motions
+    constexpr double kRounding = 1e-9;  // of the positions: a derivative that moves them less consists of rounding
+    for (const SingularWindow& w : run_.windows()) {
+      if (w.nodes.empty() || data_.active.empty() || !set_y_rho({w.t, y_bar_, y_bar_}, y0_rho, false)) continue;
+      Eigen::MatrixXd q_rho(y_rho_.rows() / 2, SingularWindow::kNodes);
+      for (const int p : data_.active) {
+        for (Eigen::Index k = 0; k < q_rho.cols(); ++k)
+          q_rho.col(k) = tangents_[static_cast<std::size_t>(k)].col(p).head(q_rho.rows());
+        const double size = data_.rho(p) == 0 ? 1 : std::abs(data_.rho(p));
+        const bool moves = q_rho.cwiseAbs().maxCoeff() * size > kRounding * w.nodes.front().y.cwiseAbs().maxCoeff();
+        if (moves && w.roughness(q_rho).maxCoeff() > kPole) run_.singular_at(w.t).parameters.push_back(p);
+      }
+    }
+  }
+  const Eigen::MatrixXd& y_rho() const { return y_rho_; }
+  // psi_rho += weight d(cost)/d(rho) with y_rho known
+  void add_forward(const DrivenTerm& term, const StatePoint& at, Eigen::MatrixXd& psi_rho) {
+    y_bar_.setZero(), rho_bar_.setZero();
+    term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
+    psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
+  }
+  // Adds the same for all terms of one objective, to the gradients in the assembled state, fields and parameters.
+  void add_backward(std::span<const DrivenTerm> terms, const StatePoint& at, Eigen::VectorXd& y0_bar,
+                    Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
+    const SingularWindow* const w = run_.window_at(at.t);
+    ContinuedMotion* const motion = run_.continued();
+    if (w && motion) motion->y_bars.assign(SingularWindow::kNodes, Eigen::VectorXd::Zero(y_bar_.size()));
+    y_bar_.setZero();
+    for (const DrivenTerm& term : terms) term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
+    if (!w) return projector_.add_adjoint(y_bar_, y0_bar, theta_bar, rho_bar);
+    std::size_t k = 0;
+    w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
+      Eigen::VectorXd y_bar = weight * y_bar_;
+      if (motion) y_bar += motion->y_bars[k++];
+      linearise({node.t, node.y, node.angles});
+      projector_.add_adjoint(y_bar, y0_bar, theta_bar, rho_bar);
+      return true;
+    });
+  }
+
+ private:
+  bool find_y_rho(const Eigen::MatrixXd& y0_rho, bool velocities) {
     const Eigen::Index rows = velocities ? y_rho_.rows() : y_rho_.rows() / 2;
     for (const ParameterBlock& b : blocks_) {
       for (int k = 0; k < kLanes; ++k) {
@@ -105,31 +165,32 @@ class DrivenDerivatives {
         if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]).head(rows) = direction_.col(k).head(rows);
       }
     }
-    return y_rho_;
-  }
-  // psi_rho += weight d(cost)/d(rho) with y_rho known
-  void add_forward(const DrivenTerm& term, const StatePoint& at, Eigen::MatrixXd& psi_rho) {
-    y_bar_.setZero(), rho_bar_.setZero();
-    term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
-    psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
-  }
-  // Adds the same for all terms of one objective, to the gradients in the assembled state, fields and parameters.
-  void add_backward(std::span<const DrivenTerm> terms, const StatePoint& at, Eigen::VectorXd& y0_bar,
-                    Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
-    y_bar_.setZero();
-    for (const DrivenTerm& term : terms) term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
-    projector_.add_adjoint(y_bar_, y0_bar, theta_bar, rho_bar);
+    return true;
   }
 
- private:
   const MechanismData& data_;
-  Projector& projector_;  // of the run, which counts its factorisations
+  DrivenRun& run_;
+  Projector& projector_;                   // of the run, which counts its factorisations
+  std::vector<Eigen::MatrixXd> tangents_;  // at the nodes of a window
   const ProjectionSolution unmoved_;
   std::vector<ParameterBlock> blocks_;
   Eigen::VectorXd y_bar_, rho_bar_;
   Eigen::MatrixXd y_rho_;
   LaneRows y0_dir_, direction_;
 };
+
+// ydot at a point, within a singular window continued as the state there.
+bool set_rates(SpatialDynamics& dynamics, const SingularWindow* w, const StatePoint& at, Eigen::VectorXd& ydot) {
+  if (!w) return dynamics.evaluate(at.t, at.y, at.angles, ydot);
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(ydot.size());
+  const bool evaluated = w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
+    const bool ok = dynamics.evaluate(node.t, node.y, node.angles, ydot);
+    sum += weight * ydot;
+    return ok;
+  });
+  ydot = sum;
+  return evaluated;
+}
 
 }  // namespace
 
@@ -170,18 +231,18 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
   DrivenRun run(mechanism, settings, costs, sampling.times, options, start, true);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
-  DrivenDerivatives derivatives(mechanism, run.projector());
+  DrivenDerivatives derivatives(mechanism, run);
   Eigen::MatrixXd y0_rho = Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters());
   if (run.model() == Model::planar && moves_out_of_plane(mechanism.data())) y0_rho = start.tangent();
   std::optional<SpatialDynamics> dynamics;  // of the rates that observers get
   if (rates == Rates::known) dynamics.emplace(mechanism, settings.formulation);
   Eigen::VectorXd ydot(mechanism.states());
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
-    if (!derivatives.linearise(at)) return false;
+    if (!derivatives.set_y_rho(at, y0_rho, rates != Rates::without_tangents)) return false;
     ++result.statistics.linearised_states;
-    const Eigen::MatrixXd& y_rho = derivatives.y_rho(y0_rho, rates != Rates::without_tangents);
+    const Eigen::MatrixXd& y_rho = derivatives.y_rho();
     const bool observed = std::ranges::any_of(terms, [](const DrivenTerm& term) { return !term.cost; });
-    if (observed && dynamics && !dynamics->evaluate(at.t, at.y, at.angles, ydot)) return false;
+    if (observed && dynamics && !set_rates(*dynamics, run.window_at(at.t), at, ydot)) return false;
     for (const DrivenTerm& term : terms) {
       if (term.cost) {
         derivatives.add_forward(term, at, result.psi_rho);
@@ -193,6 +254,7 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
     }
     return y_rho.allFinite();
   });
+  derivatives.note_parameters(y0_rho);
   return run.finish();
 }
 
@@ -201,12 +263,12 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
   DrivenRun run(mechanism, settings, costs, {}, options, start, true);
   SimulationResult& result = run.result();
   const MechanismData& d = mechanism.data();
-  DrivenDerivatives derivatives(mechanism, run.projector());
+  DrivenDerivatives derivatives(mechanism, run);
   std::vector<Eigen::VectorXd> y0_bar(costs.size(), Eigen::VectorXd::Zero(mechanism.states()));
   std::vector<Eigen::VectorXd> theta_bar(costs.size(), Eigen::VectorXd::Zero(d.slots()));
   std::vector<Eigen::VectorXd> rho_bar(costs.size(), Eigen::VectorXd::Zero(d.rho.size()));
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
-    if (!derivatives.linearise(at)) return false;
+    if (!run.window_at(at.t) && !derivatives.linearise(at)) return false;
     ++result.statistics.linearised_states;
     while (!terms.empty()) {  // terms of one objective are adjacent
       const auto other = std::ranges::find_if(
@@ -218,6 +280,7 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
     }
     return true;
   });
+  derivatives.note_parameters(Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters()));
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   for (std::size_t o = 0; o < costs.size(); ++o) {
     d.add_to_rho(theta_bar[o], rho_bar[o]);

@@ -107,6 +107,7 @@ inline Vec<3> ProjectorOf<BodyInPlane>::test_load_of(int body) const {
 
 template <class Body>
 void ProjectorOf<Body>::response(Y& out) {
+  if (square_) return response_of_square(out);
   for (std::size_t i = 0; i < b_.size(); ++i) {
     const int body = static_cast<int>(i) + 1;
     b_[i] = solver_.mass_times(body, test_load_of(body));

@@ -54,9 +54,9 @@ class Projector {
   virtual void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                            Eigen::VectorXd& rho_bar) = 0;
 
-  // Computes, after project() and with its factor, the constraint forces of a fixed load on all bodies. It also
-  // computes the forces that these cause as accelerations of the constraints. Near a singular position they grow as
-  // 1/d^3 in the directions that become free, d the distance from it, and change sign there.
+  // Computes, after project() or settle() and with its factor, the constraint forces of a fixed load on all bodies. It
+  // also computes the forces that these cause as accelerations of the constraints. Near a singular position they grow
+  // as 1/d^3 in the directions that become free, d the distance from it, and change sign there.
   virtual void response(Eigen::VectorXd& out) = 0;
 
   // The largest violations at y: those of Phi and the unit norms, and those of their rates. `relative` receives that of

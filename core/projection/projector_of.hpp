@@ -55,6 +55,7 @@ class ProjectorOf final : public Projector {
   bool factor(double t, const Y& y_hat);                // of S(q~)
   bool factor_square();                                 // J at the frames
   void solve_square(const Y& rows, std::vector<X>& x);  // J x = rows
+  void response_of_square(Y& out);                      // after settle()
   // Calls f(body, its number without the ground, its frame).
   template <class F>
   void for_bodies(F&& f) {

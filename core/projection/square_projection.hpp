@@ -77,6 +77,16 @@ bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) 
   return y.allFinite();
 }
 
+template <class Body>
+void ProjectorOf<Body>::response_of_square(Y& out) {
+  out.resize(phi_.size());
+  for (std::size_t i = 0; i < delta_.size(); ++i)
+    out.template segment<N>(N * static_cast<Eigen::Index>(i)) = test_load_of(static_cast<int>(i) + 1);
+  J_factor_.solve_transposed(out);
+  J_factor_.solve(out);
+  J_factor_.solve_transposed(out);
+}
+
 // Small steps follow the flow qdot = -J^-1 Phi, along which Phi falls as exp(-s) and det J cannot change its sign.
 template <class Body>
 bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y) {

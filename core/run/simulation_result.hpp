@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/run/cost.hpp"
+#include "core/start/singular_window.hpp"
 
 namespace mbsopt {
 
@@ -68,7 +69,8 @@ struct SimulationStatistics {
   // The worst resolved running cost, exponential of a smooth extreme, and derivative of either (quadrature_watch.hpp).
   // They are 0 with CVODES, which controls this error.
   QuadratureError quadrature, extreme_quadrature, gradient_quadrature;
-  std::vector<Jump> jumps;  // in runs with derivatives
+  std::vector<Jump> jumps;                 // in runs with derivatives
+  std::vector<SingularPosition> singular;  // of solved runs: those asked for
   // The largest error of a step near a singular position that its projection removed, in tolerances, and its time [s].
   // States within such steps are not projected.
   double projected_error = 0, projected_error_time = 0;

@@ -169,6 +169,9 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   add(unresolved(settings, statistics.solved, statistics.gradient_quadrature, "the derivative of the integrand",
                  "the gradient"));
   add(near_singular(settings, statistics));
+  std::vector<std::string> parameters;
+  for (const Parameter& p : scene.parameters) parameters.push_back(p.name);
+  if (std::string words = in_words(statistics.singular, parameters); !words.empty()) warnings.push_back(words);
   for (const Jump& jump : statistics.jumps) warnings.push_back(in_words(scene, jump));
   return warnings;
 }

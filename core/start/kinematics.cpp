@@ -23,6 +23,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kDrivenRankThreshold = 1e-7;  // rows of J scaled to unit length
+constexpr double kDigitsOfInstant = 1e-3;      // the same at the instant of a window, which is known to some digits
 
 // J at a state with rows scaled to unit length, for linear solves without masses.
 class DrivenRows {
@@ -40,13 +41,13 @@ class DrivenRows {
       set_velocity(y.segment<7>(layout.v(k)), states_[k], frames_[k]);
     }
   }
-  void factor() {
+  void factor(double threshold = kDrivenRankThreshold) {
     if (d_.m == 0) return;
     rows_.evaluate(frames_);
     J_ = rows_.dense();
     scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
     unit_rows_.noalias() = scale_.asDiagonal() * J_;
-    scaled_.compute(unit_rows_, kDrivenRankThreshold);
+    scaled_.compute(unit_rows_, threshold);
   }
   const VectorXd& phi(const VectorXd& angles) {
     ConstraintTerms(d_).phi(frames_, laws_, angles, phi_);
@@ -124,9 +125,10 @@ class DrivenMotion final : public MotionSource {
 
 // Finds the degrees of freedom that J leaves at a position, and the owners of equations that depend on each other
 // there. These have a share in null vectors of J'.
-SingularPosition rank_at(const MechanismData& d, DrivenRows& rows, double t, const VectorXd& y) {
+SingularPosition rank_at(const MechanismData& d, DrivenRows& rows, double t, const VectorXd& y,
+                         double threshold = kDrivenRankThreshold) {
   rows.set(t, y);
-  rows.factor();
+  rows.factor(threshold);
   SingularPosition s;
   s.t = t;
   s.rank_lost = static_cast<int>(6 * d.n - rows.rank());
@@ -134,7 +136,7 @@ SingularPosition rank_at(const MechanismData& d, DrivenRows& rows, double t, con
   const LeftSingular svd = left_singular(rows.unit_rows());
   std::set<std::string> seen;
   for (Index k = 0; k < rows.unit_rows().rows(); ++k) {
-    if (k < svd.values.size() && svd.values(k) > kDrivenRankThreshold) continue;
+    if (k < svd.values.size() && svd.values(k) > threshold) continue;
     for (const Constraint& c : d.constraints) {
       if (svd.U.col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
       const std::string owner = c.drive >= 0 ? "drive '" + d.drive_names[static_cast<std::size_t>(c.drive)] + "'"
@@ -149,15 +151,25 @@ SingularPosition rank_at(const MechanismData& d, DrivenRows& rows, double t, con
 class Kinematics {
  public:
   Kinematics(const Mechanism& mechanism, const FormulationSettings& formulation)
-      : d_(mechanism.data()), motion_(mechanism, formulation), path_(mechanism, Model::spatial), rows_(d_) {}
+      : d_(mechanism.data()),
+        motion_(mechanism, formulation),
+        path_(mechanism, Model::spatial),
+        continued_(motion_, [this](double t) { return path_.window_at(t); }),
+        rows_(d_) {
+    path_.set_watch(
+        [this](const DrivenState& from, const DrivenState& to) { return past_half_turn(d_, from.y, to.t, to.y); });
+  }
 
-  void start(double t, const VectorXd& y, const VectorXd& angles) { path_.start(t, y, angles); }
-  StatePoint point() { return {path_.state().t, path_.state().y, path_.state().angles, &motion_}; }
+  void start(double t, double end, const VectorXd& y, const VectorXd& angles) { path_.start(t, end, y, angles); }
+  StatePoint point() { return {path_.state().t, path_.state().y, path_.state().angles, &continued_}; }
+  const SingularWindow* window() const { return path_.window_at(t()); }
+  bool is_uncertain() const { return path_.is_uncertain(); }
+  const std::string& objection() const { return path_.objection(); }
   double t() const { return path_.state().t; }
   double step_limit() const { return path_.step_limit(); }
   bool advance(double h, double t1) {
     if (!path_.advance(h, t1)) return false;
-    polish();
+    if (!window()) polish();
     return true;
   }
   double position_violation() { return path_.position_violation(); }
@@ -206,11 +218,19 @@ class Kinematics {
   const MechanismData& d_;
   DrivenMotion motion_;
   DrivenPath path_;
+  ContinuedMotion continued_;
   DrivenRows rows_;
   VectorXd y_;
 };
 
 }  // namespace
+
+SingularPosition singular_position(const Mechanism& mechanism, double t, const VectorXd& y, double half) {
+  DrivenRows rows(mechanism.data());
+  SingularPosition s = rank_at(mechanism.data(), rows, t, y, kDigitsOfInstant);
+  s.half = half;
+  return s;
+}
 
 std::string why_stuck(const Mechanism& mechanism, double t, const VectorXd& y) {
   DrivenRows rows(mechanism.data());
@@ -238,7 +258,7 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
   }
   const int freedoms = start.summary().degrees_of_freedom;
   Kinematics k(mechanism, settings.formulation);
-  k.start(times.front(), start.result().y, start.result().angles);
+  k.start(times.front(), times.back(), start.result().y, start.result().angles);
   if (freedoms > 0 && k.rank_here().rank_lost > 0) {
     result.message = fmt::format(
         "the drives leave {}. Kinematics needs every motion driven, by drives or by a condition on a sensor "
@@ -273,15 +293,20 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
       }
       h /= 2;
       if (h < 1e-9 * std::max(1e-3, times.back() - times.front())) {
-        result.message = why_stuck(mechanism, k.t(), k.point().y);
+        result.message = k.objection().empty() ? why_stuck(mechanism, k.t(), k.point().y) : k.objection();
         return result;
       }
     }
     result.last_good_time = k.t();
     result.max_position_violation = std::max(result.max_position_violation, k.position_violation());
     result.max_velocity_violation = std::max(result.max_velocity_violation, k.velocity_violation());
-    SingularPosition here = k.rank_here();
-    if (here.rank_lost > 0) result.singular.push_back(std::move(here));
+    if (const SingularWindow* const w = k.window()) {
+      if (result.singular.empty() || result.singular.back().t != w->t)
+        result.singular.push_back(singular_position(mechanism, w->t, w->state_at(w->t).y, w->half));
+      for (const std::string& name : lacking_sensors(mechanism, k.point())) result.singular.back().note(name);
+    } else if (k.is_uncertain()) {
+      result.singular.push_back(singular_position(mechanism, k.t(), k.point().y, 0));
+    }
     if (!observe(i, k.point())) return stopped();
   }
   result.ok = true;

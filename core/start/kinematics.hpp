@@ -18,14 +18,9 @@
 #include "core/mechanism/state_point.hpp"
 #include "core/scene/settings.hpp"
 #include "core/start/assembly.hpp"
+#include "core/start/singular_window.hpp"
 
 namespace mbsopt {
-
-struct SingularPosition {
-  double t = 0;
-  int rank_lost = 0;
-  std::vector<std::string> owners;  // "joint 'A'", "drive 'motor'"
-};
 
 struct KinematicsResult {
   bool ok = false;
@@ -43,6 +38,9 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
                                   const std::vector<double>& times,
                                   const std::function<bool(std::size_t, const StatePoint&)>& observe,
                                   const std::function<bool(double)>& go_on = {});
+
+// The singular position of a state, with half of its window.
+SingularPosition singular_position(const Mechanism& mechanism, double t, const Eigen::VectorXd& y, double half);
 
 // The reason why the positions cannot be continued from a state at t, in words.
 std::string why_stuck(const Mechanism& mechanism, double t, const Eigen::VectorXd& y);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,6 +9,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
 #include "core/sensor/body_at.hpp"
+#include "core/start/driven_path.hpp"
 
 namespace mbsopt {
 namespace {
@@ -19,7 +19,6 @@ constexpr double kGrown = 0.5;                              // of the total ener
 constexpr double kNoticeableChange = 1e-3;                  // of the natural energy: smaller changes are ignored
 constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
 constexpr double kGrowth = 1e3;                             // of the largest speed at the start
-constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
 
 // The natural size of the energy of a motion. It is a scale for runs that begin at rest at zero potential.
 double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
@@ -45,10 +44,7 @@ double size_of(const Energy& e) { return e.kinetic + std::abs(e.potential); }
 }  // namespace
 
 RunGuard::RunGuard(const MechanismData& data)
-    : data_(data),
-      conserves_energy_(conserves_energy(data)),
-      law_jumps_(data),
-      bushing_turns_(data.forces->of<Bushing>().size(), Vector3d::Zero()) {}
+    : data_(data), conserves_energy_(conserves_energy(data)), law_jumps_(data) {}
 
 std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps) {
   last_t_ = t;
@@ -70,29 +66,8 @@ std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& en
         "end in s?",
         body, omega, t_end, max_steps);
   }
-  for (Vector3d& turn : bushing_turns_) turn.setZero();
-  return about_bushings(t, y);
-}
-
-// Between two steps a rotation vector reverses through zero or, if zero is farther, through half a turn.
-std::string RunGuard::about_bushings(double t, const Eigen::VectorXd& y) {
-  for (std::size_t k = 0; k < bushing_turns_.size(); ++k) {
-    const Bushing& b = data_.forces->of<Bushing>()[k];
-    if (b.Kt.isZero(0) && b.Ct.isZero(0)) continue;
-    const Matrix3d R = body_at(y, b.body1).frame.A.transpose() * body_at(y, b.body2).frame.A * b.R0.transpose();
-    const Eigen::AngleAxisd turn(R);
-    const double angle = turn.angle();
-    const Vector3d now = angle * turn.axis(), before = bushing_turns_[k];
-    bushing_turns_[k] = now;
-    if (angle < kHalfTurn && !(now.dot(before) < 0 && angle + before.norm() > std::numbers::pi)) continue;
-    return fmt::format(
-        "forces[{}], the bushing between '{}' and '{}', is turned by {:.4g} rad at t = {:.6g} s: at half a turn its "
-        "torque jumps from one side to the other. Keep it below (a stop, stiffer or damped rubber, a slower start), or "
-        "take a joint with an rsda, which counts turns",
-        b.force, data_.body_names[static_cast<std::size_t>(b.body1)],
-        data_.body_names[static_cast<std::size_t>(b.body2)], angle, t);
-  }
-  return {};
+  last_y_ = y;
+  return past_half_turn(data_, y, t, y);
 }
 
 std::string RunGuard::about_energy(double t, const Energy& energy) {
@@ -141,7 +116,8 @@ std::string RunGuard::objection(double t, const Eigen::VectorXd& y, const Energy
   }
   if (words.empty() && conserves_energy_) words = about_energy(t, energy);
   if (words.empty()) words = about_speed(t, y);
-  if (words.empty()) words = about_bushings(t, y);
+  if (words.empty()) words = past_half_turn(data_, last_y_, t, y);
+  last_y_ = y;
   return words;
 }
 

@@ -32,13 +32,12 @@ class RunGuard {
  private:
   std::string about_energy(double t, const Energy& energy);
   std::string about_speed(double t, const Eigen::VectorXd& y) const;
-  std::string about_bushings(double t, const Eigen::VectorXd& y);
 
   const MechanismData& data_;
   bool conserves_energy_;
   LawJumps law_jumps_;
-  std::vector<Vector3d> bushing_turns_;  // rotation vectors after the step before [rad]
   double last_t_ = 0;
+  Eigen::VectorXd last_y_;
   double energy_initial_ = 0, energy_largest_ = 0, energy_natural_ = 0;  // natural: of weights and springs [J]
   double energy_drift_ = 0;
   Eigen::Vector2d bounds_;  // of the speed of a centre of mass [m/s] and of turning [rad/s]
