@@ -228,7 +228,9 @@ double DrivenPath::fill(SingularWindow& w, const DrivenState& base) {
       kPartOfRoughness * std::max(w.roughness(y.topRows(half)).maxCoeff(), w.roughness(y.bottomRows(half)).maxCoeff());
   for (const double part : {-0.5, 0.0, 0.5}) {
     const DrivenState s = w.state_at(w.t + part * w.half);
-    error = std::max(error, projector_->position_violation(s.t, s.angles, s.y));
+    double violation = 0;
+    projector_->position_violation(s.t, s.angles, s.y, &violation);
+    error = std::max(error, violation);
   }
   return error;
 }
