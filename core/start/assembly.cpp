@@ -254,6 +254,7 @@ struct Assembly::Solution {
   // condition on an expression of angles may hold only on other turns; angles then keep those to which they were
   // continued.
   void set_angles() {
+    if (equilibrium.ok) return void(result.angles = equilibrium.angles);  // the forces balance at these
     const VectorXd continued = position.followed_angles();
     position.start_branches(result.y);
     const auto is_turned = [&](const AssemblyTarget& target) {
@@ -410,6 +411,12 @@ double Assembly::rounding() const {
   const NearestPointLinearisation &q = s.q->linearisation, &v = s.v->linearisation;
   const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho), v_g = d.v_g_q * q_rho + d.v_g_rho;
   return std::max(q.rounding(q_rho, d.q_g_rho), v.rounding(v.solve(d.v_b_q * q_rho + d.v_b_rho, v_g), v_g));
+}
+
+std::vector<std::string> Assembly::equilibrium_warnings() const {
+  const Solution& s = *solution_;
+  if (!s.equilibrium.ok) return {};
+  return mbsopt::equilibrium_warnings(s.mechanism, s.start, s.equilibrium.q, s.equilibrium.angles);
 }
 
 int Assembly::degrees_of_freedom() const {

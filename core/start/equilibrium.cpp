@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 
 #include "core/body/euler_parameters.hpp"
@@ -23,12 +24,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostEquilibriumIterations = 500;
+constexpr int kMostIterations = 5000;        // chains that slide along stiff stops take some hundreds
 constexpr double kLargestStep = 0.2;         // of a coordinate at once [lengths of the mechanism, rad]
+constexpr double kApart = 0.05;              // the places along a step at which forces are computed [the same]
+constexpr double kBeside = 1e-5;             // from the equilibrium, to see where the forces drive it [the same]
+constexpr double kAtKink = 1e-7;             // an equilibrium as near to a kink is at it [the same]
+constexpr double kLeastKink = 1e-6;          // of the change of forces over this distance, whose rounding is 1e-8
 constexpr double kRestRankThreshold = 1e-8;  // rows of J scaled to unit length
 constexpr double kTolerance = 1e-11;         // of the last Newton step [lengths of the mechanism, rad]
-constexpr double kPredicted = 0.5;           // of the forces: a downhill step with a larger difference is too long
-constexpr double kWellPredicted = 0.1;       // and one that differs less may be followed by a longer one
+constexpr double kRounding = 1e-14;          // of the terms of a force: a few additions
+constexpr double kLargestError = 0.5;        // of a step, relative to it: the linear equations predict the rest
+constexpr double kAimedError = 0.25;         // the next step has about this one
+constexpr double kFastest = 0.02;            // of sigma: its largest change from a step to the next
 
 class Statics {
  public:
@@ -157,18 +164,31 @@ class Statics {
   }
 
   const VectorXd& z() const { return z_; }
+  VectorXd loads() const {
+    VectorXd f(freedoms_);
+    for (Index k = 0; k < f.size(); k += 6) f.segment<6>(k) = dynamics_.loads()[static_cast<std::size_t>(k / 6)];
+    return f;
+  }
 
   const VectorXd& angles() const { return angles_; }
   void set_angles(const VectorXd& angles) { angles_ = angles; }
 
-  // The largest part of xi, in lengths of the mechanism and rad.
-  double size_of(const VectorXd& xi) const {
-    double size = 0;
-    for (int i = 1; i <= d_.n; ++i) {
-      const Index r = layout_.z(i), theta = r + 3;
-      size = std::max(
-          {size, xi.segment<3>(r).lpNorm<Eigen::Infinity>() / length_, xi.segment<3>(theta).lpNorm<Eigen::Infinity>()});
-    }
+  // Does evaluate() at q moved by xi.
+  bool evaluate_beside(const VectorXd& q, const VectorXd& xi) {
+    const VectorXd angles = angles_;
+    VectorXd beside = q + to_q(q, xi);
+    const bool moved = settle(beside) && evaluate(beside);
+    angles_ = angles;
+    return moved;
+  }
+
+  // The largest part of xi, in lengths of the mechanism and rad, and its body, counted from 1.
+  double size_of(const VectorXd& xi, int* body = nullptr) const {
+    VectorXd sizes = xi.cwiseAbs();
+    for (int i = 1; i <= d_.n; ++i) sizes.segment<3>(layout_.z(i)) /= length_;
+    Index most = 0;
+    const double size = sizes.maxCoeff(&most);
+    if (body) *body = static_cast<int>(most / 6) + 1;
     return xi.allFinite() ? size : INFINITY;
   }
 
@@ -215,84 +235,136 @@ class Statics {
   VectorXd angles_, y_, ydot_, z_;
 };
 
-// N'M (sigma I - Z) N y = N'M z at one position: `stiffness` is -N'M Z N.
+// N'M (sigma I - Z) N y = N'M z at one position. N is orthonormal in M, so that sigma y is a force.
 struct FreeMotion {
-  MatrixXd N, stiffness, mass;
-  VectorXd force;
+  MatrixXd N, NM, stiffness;    // stiffness: -N'M Z N
+  VectorXd force, force_terms;  // N'M z; |N|'|f|, whose rounding it carries
+  bool regular = true;          // N'M N is
+  double growth = 0;            // of the overdamped motion y' = -stiffness y; 0 if it decays
+
   explicit FreeMotion(Statics& statics) : N(statics.rows().N) {
     if (N.cols() == 0) return;
-    const MatrixXd NM = statics.mass_times(N).transpose();
+    const MatrixXd L = cholesky_factor(N.transpose() * statics.mass_times(N));
+    regular = L.size() > 0;
+    if (!regular) return;
+    N = N * inverse(L).transpose();
+    NM = statics.mass_times(N).transpose();
     stiffness = -NM * (statics.z_of_positions() * N);
-    mass = NM * N;
     force = NM * statics.z();
+    force_terms = N.cwiseAbs().transpose() * statics.loads().cwiseAbs();
+    if (cholesky_factor(stiffness + stiffness.transpose()).size() == 0)
+      growth = std::max(0.0, -general_eigen(stiffness).values.real().minCoeff());
   }
-  VectorXd step(double sigma) const { return OrthogonalDecomposition(stiffness + sigma * mass).solve(force); }
-  bool goes_downhill(double sigma) const {
-    const MatrixXd S = stiffness + sigma * mass;
-    return symmetric_eigen(S + S.transpose()).values(0) > 0;
+  OrthogonalDecomposition damped(double sigma) const {
+    return OrthogonalDecomposition(stiffness + sigma * MatrixXd::Identity(N.cols(), N.cols()));
+  }
+  // Returns whether F is rounding of the loads, and of stiff springs over a displacement of norm y.
+  bool is_rounding(const VectorXd& F, double y) const {
+    return (F.array().abs() <= kRounding * (force_terms.array() + y * stiffness.norm())).all();
   }
 };
 
-bool at_rest(double size, double sigma, double acceleration) {
-  return size < kTolerance && sigma < 1e-3 * (1 + acceleration);
-}
-
-constexpr const char* kNoAccelerations = "the accelerations cannot be computed on the way";
-
-// Pseudo-transient continuation: sigma falls with the remaining acceleration. It takes a few iterations if the
-// acceleration falls steadily. Returns an empty string if q is the equilibrium, else the reason.
-std::string continue_to_rest(Statics& statics, VectorXd& q, int& iterations) {
-  double sigma = 0, before = 0;
-  for (int k = 0; k < kMostEquilibriumIterations; ++k, ++iterations) {
-    if (!statics.evaluate(q)) return kNoAccelerations;
-    const double now = statics.size_of(statics.z());
-    sigma = k == 0 ? now / kLargestStep : sigma * std::min(now / before, 4.0);
-    if (sigma < 1e-9 * (1 + now)) sigma = 0;
-    before = now;
-    const FreeMotion free(statics);
-    if (free.N.cols() == 0 || now == 0) return {};
-    const VectorXd xi = free.N * free.step(sigma);
-    const double size = statics.size_of(xi);
-    if (!std::isfinite(size)) return "a step towards it is not finite";
-    q += statics.to_q(q, (size > kLargestStep ? kLargestStep / size : 1.0) * xi);
-    if (!statics.settle(q)) return "the joints cannot be kept closed on the way to it";
-    if (at_rest(size, sigma, now)) return {};
+// Returns the error of the step y from q: along it, the forces differ from the linear ones, force - c stiffness y at
+// the part c. The error is the step of these differences, relative to y. It is infinite if the mechanism cannot be
+// moved so. q becomes the end of the step.
+double error_along(Statics& statics, const FreeMotion& free, const OrthogonalDecomposition& damped, const VectorXd& y,
+                   VectorXd& q) {
+  const VectorXd from = q, change = free.stiffness * y;
+  const MatrixXd direction = statics.to_q(from, free.N * y);
+  const double size = statics.size_of(free.N * y);
+  const int parts = 1 + static_cast<int>(size / kApart);
+  double error = 0;
+  for (int k = 1; k <= parts && error < kLargestError; ++k) {
+    const double c = static_cast<double>(k) / parts;
+    q = from + c * direction;
+    if (!statics.settle(q) || !statics.evaluate(q)) return INFINITY;
+    const VectorXd difference = free.NM * statics.z() - free.force + c * change;
+    error = std::max(error, statics.size_of(free.N * damped.solve(difference)) / size);
   }
-  return statics.what_is_left();
+  return error;
 }
 
-// Does the same if the acceleration rises and falls on the way. Each step is one of the overdamped motion. It goes
-// downhill, and is so short that the linear equations predict the forces at its end.
+// Follows the overdamped motion y' = N'M z by implicit Euler steps of the length 1/sigma, which grow to Newton steps.
+// Returns an empty string if q is an equilibrium, else the reason.
 std::string go_downhill(Statics& statics, VectorXd& q, int& iterations) {
+  constexpr const char* kNoAccelerations = "the accelerations cannot be computed on the way";
   if (!statics.evaluate(q)) return kNoAccelerations;
   double sigma = statics.size_of(statics.z()) / kLargestStep;
-  for (int tries = 0; tries < 2 * kMostEquilibriumIterations;) {
+  while (iterations < kMostIterations) {
     const FreeMotion free(statics);
-    const double now = statics.size_of(statics.z());
-    if (free.N.cols() == 0 || now == 0) return {};
-    const VectorXd angles = statics.angles();
-    for (bool taken = false; !taken && tries < 2 * kMostEquilibriumIterations; ++tries, ++iterations) {
-      const VectorXd y = free.step(sigma), xi = free.N * y;
-      const double size = statics.size_of(xi);
-      double difference = INFINITY;
-      VectorXd trial = q + statics.to_q(q, xi);
-      if (size < kLargestStep && free.goes_downhill(sigma) && statics.settle(trial) && statics.evaluate(trial)) {
-        const VectorXd force = statics.mass_times(free.N).transpose() * statics.z();
-        difference = size < kTolerance ? 0 : (force - sigma * (free.mass * y)).norm() / free.force.norm();
-      }
-      taken = difference < kPredicted;
-      if (taken) {
-        q = trial;
-        if (at_rest(size, sigma, now)) return {};
-        if (difference < kWellPredicted) sigma /= 10;
-      } else {
-        statics.set_angles(angles);
-        sigma = std::max(4 * sigma, 1e-9 * (1 + now));
-      }
+    if (!free.regular) return "a free motion moves no mass";
+    if (free.N.cols() == 0 || free.is_rounding(free.force, 0)) return {};
+    // The Newton step leaves neutral motions alone. The forces along these have to vanish by themselves.
+    const VectorXd newton = free.damped(0).solve(free.force), xi = free.N * newton;
+    const double one_length = 1 / statics.size_of(free.N.rowwise().norm());
+    if (statics.size_of(xi) < kTolerance && free.is_rounding(free.force - free.stiffness * newton, one_length)) {
+      q += statics.to_q(q, xi);
+      return statics.settle(q) ? "" : "the joints cannot be kept closed there";
+    }
+    // A step is shorter than half the time in which the overdamped motion leaves an unstable equilibrium.
+    sigma = std::max({sigma, 2 * free.growth, 1e-15 * free.stiffness.norm()});
+    const VectorXd start = q, angles = statics.angles();
+    double error = INFINITY;
+    while (iterations < kMostIterations) {
+      ++iterations;
+      const OrthogonalDecomposition damped = free.damped(sigma);
+      const VectorXd y = damped.solve(free.force);
+      const double size = statics.size_of(free.N * y);
+      if (size < kLargestStep) error = error_along(statics, free, damped, y, q);
+      if (error < kLargestError) break;
+      if (size < kTolerance) return fmt::format("the forces jump on the way; {}", statics.what_is_left());
+      q = start, statics.set_angles(angles),
+      sigma *= std::isfinite(error) ? std::clamp(error / kAimedError, 4., 64.) : 4;
+    }
+    sigma *= std::max(kFastest, error / kAimedError);
+  }
+  return statics.evaluate(q) ? statics.what_is_left() : kNoAccelerations;
+}
+
+// The body that moves most along a free motion on which the forces drive it away from the equilibrium q; else 0.
+int leaving_body(Statics& statics, const FreeMotion& free, const VectorXd& q) {
+  if (free.growth == 0) return 0;
+  const GeneralEigen eigen = general_eigen(free.stiffness);
+  Index k = 0;
+  eigen.values.real().minCoeff(&k);
+  // The real part v of the eigenvector, at the phase at which it is orthogonal to the imaginary one: there
+  // v'stiffness v = Re(lambda) v'v.
+  const Eigen::VectorXcd w = eigen.vectors.col(k);
+  VectorXd v = (w * std::polar(1.0, -0.5 * std::arg(w.cwiseProduct(w).sum()))).real();
+  v *= kBeside / statics.size_of(free.N * v);
+  const VectorXd xi = free.N * v;
+  const double rounding =
+      kRounding * (v.cwiseAbs().dot(free.force_terms) + free.stiffness.norm() * v.squaredNorm() / kBeside);
+  for (const double side : {1.0, -1.0}) {
+    if (!statics.evaluate_beside(q, side * xi) || !(side * v.dot(free.NM * statics.z()) > rounding)) continue;
+    int body = 0;
+    statics.size_of(xi, &body);
+    return body;
+  }
+  return 0;
+}
+
+// The body whose forces have a kink at the equilibrium q; else 0. At a kink the second difference over h falls as h,
+// and elsewhere as h^2.
+int kinked_body(Statics& statics, const FreeMotion& free, const VectorXd& q) {
+  const VectorXd xi = free.N * VectorXd::LinSpaced(free.N.cols(), 1, 2);  // moves all that is free
+  if (!statics.evaluate(q)) return 0;
+  const VectorXd f = statics.loads();
+  Eigen::ArrayXd bend[2];
+  double change = 0;
+  for (const int k : {0, 1}) {
+    const double h = (k == 0 ? kAtKink : 0.1 * kAtKink) / statics.size_of(xi);
+    bend[k] = -2 * f.array();
+    for (const double side : {h, -h}) {
+      if (!statics.evaluate_beside(q, side * xi)) return 0;
+      bend[k] += statics.loads().array();
+      change = std::max(change, (statics.loads() - f).lpNorm<Eigen::Infinity>());
     }
   }
-  if (!statics.evaluate(q)) return kNoAccelerations;
-  return statics.what_is_left();
+  const Eigen::ArrayXd near = bend[1].abs();
+  Index most = 0;
+  const double kink = (near > 0.05 * bend[0].abs()).select(near, 0).maxCoeff(&most);
+  return kink > kLeastKink * change ? static_cast<int>(most / 6) + 1 : 0;
 }
 
 }  // namespace
@@ -305,13 +377,7 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
     e.message = "static equilibrium not found: " + std::move(message);
     return e;
   };
-  std::string why = continue_to_rest(statics, e.q, e.iterations);
-  if (!why.empty()) {
-    e.q = q_guess;
-    statics.set_angles(angles);
-    why = go_downhill(statics, e.q, e.iterations);
-  }
-  if (!why.empty()) return fail(why);
+  if (const std::string why = go_downhill(statics, e.q, e.iterations); !why.empty()) return fail(why);
   if (!statics.evaluate(e.q)) return fail("the accelerations cannot be computed there");
   const Statics::Rows rows = statics.rows();
   const MatrixXd particular = rows.particular(-rows.phi_rho);
@@ -323,8 +389,31 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
     xi_rho += rows.N * OrthogonalDecomposition(reduced).solve(right);
   }
   e.q_rho = statics.to_q(e.q, xi_rho);
+  e.angles = statics.angles();
   e.ok = true;
   return e;
+}
+
+std::vector<std::string> equilibrium_warnings(const Mechanism& mechanism, double t, const VectorXd& q,
+                                              const VectorXd& angles) {
+  std::vector<std::string> warnings;
+  Statics statics(mechanism, t, q, angles);
+  if (!statics.evaluate(q)) return warnings;
+  const FreeMotion free(statics);
+  if (free.N.cols() == 0 || !free.regular) return warnings;
+  const MechanismData& d = mechanism.data();
+  if (const int body = leaving_body(statics, free, q); body > 0)
+    warnings.push_back(
+        fmt::format("the static equilibrium is unstable: the forces drive body '{}' away as soon as it moves a little. "
+                    "The guess lies on the ridge between two valleys; move it into the valley that is meant",
+                    d.body_names[at(body)]));
+  if (d.active.empty()) return warnings;
+  if (const int body = kinked_body(statics, free, q); body > 0)
+    warnings.push_back(fmt::format(
+        "the forces on body '{}' have a kink exactly at the static equilibrium: its derivatives are those of "
+        "one side, and differ on the other",
+        d.body_names[at(body)]));
+  return warnings;
 }
 
 }  // namespace mbsopt

@@ -2,18 +2,20 @@
 //
 //   z(q, v = 0, t0) = 0,   Phi(q, t0) = 0              z = (rddot, omegadot) per body, from the equations of motion
 //
-// From a point on the constraints, pseudo-transient continuation follows the overdamped motion to the nearest
-// equilibrium along it. N is an orthonormal basis of the motions that joints and drives leave free, and xi = xi_p + N
-// y:
+// From a point on the constraints, pseudo-transient continuation follows the overdamped motion M y' = N'M z to the
+// equilibrium of the same valley. N is a basis of the motions that joints and drives leave free, orthonormal in M, and
+// xi = N y:
 //
-//   N'M (sigma I - Z_q) N y = N'M (z + Z_q xi_p),   J xi_p = -Phi,   sigma falling with the remaining acceleration
+//   (sigma I - N'M Z_q N) y = N'M z       sigma falls as long as this predicts the forces along the step
 //
-// sigma -> 0 is Newton's method. Kelley and Keyes, "Convergence analysis of pseudo-transient continuation", SIAM J.
-// Numer. Anal. 35 (1998). The derivative is that of these equations and does not depend on the path:
-//   -N'M Z_q N y' = N'M (Z_rho + Z_q xi_p'),  J xi_p' = -Phi_rho.
+// Forces need no potential, and may have kinks: a step ends near a kink, or passes it by little. sigma -> 0 is Newton's
+// method. Kelley and Keyes, "Convergence analysis of pseudo-transient continuation", SIAM J. Numer. Anal. 35 (1998).
+// The derivative is that of the equations and does not depend on the path:
+//   -N'M Z_q N y' = N'M (Z_rho + Z_q xi_p'),  J xi_p' = -Phi_rho,  xi' = xi_p' + N y'
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/mechanism/mechanism.hpp"
 
@@ -21,14 +23,18 @@ namespace mbsopt {
 
 struct Equilibrium {
   bool ok = false;
-  std::string message;    // the remaining acceleration, if it failed
-  Eigen::VectorXd q;      // 7n
-  Eigen::MatrixXd q_rho;  // 7n x P, all parameters
+  std::string message;     // the remaining acceleration, if it failed
+  Eigen::VectorXd q;       // 7n
+  Eigen::VectorXd angles;  // branches of followed joint angles, continued on the way
+  Eigen::MatrixXd q_rho;   // 7n x P, all parameters
   int iterations = 0;
 };
 
 // q_guess must satisfy the constraints. angles holds branches of followed joint angles there.
 Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Eigen::VectorXd& q_guess,
                                const Eigen::VectorXd& angles);
+// Sentences on an equilibrium q that is unstable, or at which a force has a kink.
+std::vector<std::string> equilibrium_warnings(const Mechanism& mechanism, double t, const Eigen::VectorXd& q,
+                                              const Eigen::VectorXd& angles);
 
 }  // namespace mbsopt
