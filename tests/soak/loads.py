@@ -259,3 +259,27 @@ class Loads:
         """An equilibrium exists for sure where every body is held; only then is one worth asking for."""
         for i in range(1, len(self.m.poses)):
             self.forces.append({"name": f"f{len(self.forces) + 1}", **self.bushing_between(0, i, 0.0)})
+        for _ in range(self.rng.choice([0, 1, 2, 3])):
+            fields = self.one_sided()
+            if fields:
+                self.forces.append({"name": f"f{len(self.forces) + 1}", **fields})
+
+    def one_sided(self):
+        """A stop or a slack cable: it has a force on one side of its kink only."""
+        rng = self.rng
+        joints, x, harder = self.turning(), "l", 10 ** rng.uniform(0, 3)
+        if joints and rng.random() < 0.5:
+            joint = rng.choice(joints)
+            k, x = self.stiffness(self.least(joint.bodies, "inertia"))[0], "angle"
+            kink = joint.angle + rng.uniform(-0.5, 0.5)
+            fields = {"type": "rsda", "joint": joint.name}
+        else:
+            found = self.two_points()
+            if not found:
+                return None
+            (i, j), points, length = found
+            k, kink = self.stiffness(self.least((i, j), "mass"))[0], length * rng.uniform(0.8, 1.2)
+            fields = {"type": "tsda", "body1": self.m.poses[i].name, "body2": self.m.poses[j].name,
+                      "point1": points[0], "point2": points[1]}
+        law = rng.choice(["{}*max(0, " + x + " - {})", "-{}*max(0, {} - " + x + ")"])
+        return fields | {"law": Formula(law, harder * k, kink)}
