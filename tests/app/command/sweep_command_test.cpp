@@ -8,7 +8,11 @@
 #include <sstream>
 #include <utility>
 
+#include "app/json/read_problem.hpp"
+#include "app/starts/sweep_blocks.hpp"
 #include "app/terminal/exit_code.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "optim/machine/stopwatch.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "source_folder.hpp"
 #include "tests/app/killed_run.hpp"
@@ -203,6 +207,51 @@ TEST_CASE("resume: a sweep that is killed ends with the same bytes, from its jou
   REQUIRE(run_command(again).exit_code == kDone);
   CHECK(content_of(killed / "sweep.csv") == content_of(folder.path / "whole/sweep.csv"));
   CHECK(outcome_of(killed) == outcome_of(folder.path / "whole"));
+}
+
+TEST_CASE("a sweep that is interrupted keeps no point half done", "[command][sweep][resume]") {
+  std::string text = kSwingingRod;
+  text.replace(text.find("\"objectives\": {"), 15,
+               R"("objectives": {"lift": {"maximum_of": "tip_y", "sharpness": 80}, )");
+  Problem problem = read_problem_text(text, "rod.json");
+  problem.scene.simulation.integrator.max_step = 1e-3;
+  const StartWork work = sweep_work(
+      problem, {{"vary", {"k=7:90:9"}}, {"samples", nullptr}, {"points", ""}, {"gradients", false}, {"seed", 0}});
+  // Each true extreme takes a run of its own. The signal comes within one run or the other, or after both.
+  const InterruptGuard before;
+  const Stopwatch stopwatch;
+  work.record(4);
+  const double both = stopwatch.seconds();
+  int cut = 0;
+  for (int k = 0; k < 24; ++k) {
+    const InterruptGuard guard;
+    std::thread signal([&] { std::this_thread::sleep_for(std::chrono::duration<double>(k * both / 20)), interrupt(); });
+    const Json record = work.record(4);
+    signal.join();
+    if (record.at("status") == "stopped") ++cut;
+    CHECK(record.at("rows").size() == (record.at("status") == "ok" ? 1 : 0));
+    for (const Json& row : record.at("rows")) CHECK(row.at("true")[0].is_number());
+  }
+  CHECK(cut > 0);
+}
+
+TEST_CASE("a sweep whose folder is deleted meanwhile writes its results into a new one", "[command][sweep][resume]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kSwingingRod);
+  const std::filesystem::path out = folder.path / "out";
+  std::thread deleting([&] {
+    for (int i = 0; i < 3000 && !(std::filesystem::exists(out / kJournalFile) && journal_lines(out, "start") > 0); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    std::filesystem::remove_all(out);
+  });
+  const CommandOutcome outcome = run_command({"sweep", file, "--vary", "k=6:60:12", "--threads", "1", "--out",
+                                              out.string(), "--set", "simulation.integrator.max_step=1e-3"});
+  deleting.join();
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.err, Contains("was deleted during the run"));
+  CHECK(lines_of(out / "sweep.csv").size() == 13);
+  CHECK(json_of(out / "result.json").at("status") == "ok");
 }
 
 TEST_CASE("resume: a sweep whose points have changed is refused", "[command][sweep][resume]") {
