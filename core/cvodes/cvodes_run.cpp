@@ -12,6 +12,7 @@
 
 #include "core/sensor/body_at.hpp"
 #include "core/start/model_warnings.hpp"
+#include "core/step/step_control.hpp"
 #include "core/step/step_failure.hpp"
 #include "core/watch/jump_watch.hpp"
 #include "core/watch/run_guard.hpp"
@@ -280,6 +281,29 @@ void ForwardRun::count_steps() {
   s.linear_solves = flow_.evaluations() + linear_solver_.solves();
 }
 
+// The latest end of the step at t. CVODES cannot take back a step that passes over a pulse, so it must end before.
+double ForwardRun::stop_before_pulse(double t, PulseWatch& pulses) {
+  constexpr double kMissed = 10;       // tolerances, as of other methods (runge_kutta_run.cpp)
+  constexpr double kShortest = 1e-10;  // of the run
+  const double left = settings_.end_time - t;
+  double h = 0;
+  CVodeGetCurrentStep(memory(), &h);  // that of the next step; 0 before the first one, which is short
+  h = std::min(h, left);
+  const auto is_missed = [&](const PulseWatch::Doubt& doubt) {
+    const Flow::Numbers y(y_now_.data(), y_now_.size());
+    if (!flow_.evaluate(doubt.beside, y)) return false;
+    y_change_ = flow_.ydot();
+    if (!flow_.evaluate(doubt.at, y)) return false;
+    y_change_ = doubt.duration * (flow_.ydot() - y_change_);
+    return scaled_norm(y_change_, y_now_, y_now_, tolerances_) > kMissed;
+  };
+  bool shorter = false;
+  while (h > kShortest * (settings_.end_time - settings_.start_time) &&
+         std::ranges::any_of(pulses.doubts(t, h), is_missed))
+    h /= 2, shorter = true;
+  return shorter ? t + h : settings_.end_time;
+}
+
 // One internal step from t to t1. Returns false, with the reason in the result, if there is none.
 bool ForwardRun::advance(double t, const Hooks& hooks, double& t1) {
   count_steps();
@@ -305,7 +329,6 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   SampleSchedule schedule(costs_, observed, end);
   const Energy e = energy(mechanism_.data(), y_now_, assembly_.result().angles);
   result_.statistics.energy_initial = result_.statistics.energy_final = e.kinetic + e.potential;
-  require(CVodeSetStopTime(memory(), end));
   double t = settings_.start_time, t1 = t;
   RunGuard guard(mechanism_.data());
   const std::string at_start = guard.begin(t, y_now_, e, end, settings_.integrator.max_steps);
@@ -316,8 +339,12 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     jumps.emplace(mechanism_, settings_, costs_, flow_.motion());
     jumps->begin({t, y_now_, assembly_.result().angles, flow_.motion()});
   }
+  // CVODES sees the rates at the ends of a step.
+  PulseWatch pulses(mechanism_, t, end, {{0, 0.5, 0.5}, {1, 0.5, -0.5}});
   Eigen::VectorXd y_before;
-  while (t < end && advance(t, hooks, t1)) {
+  while (t < end) {
+    require(CVodeSetStopTime(memory(), stop_before_pulse(t, pulses)));
+    if (!advance(t, hooks, t1)) break;
     y_before = y_now_;
     y_now_ = *y_;
     if (!step_is_followed(t1 - t, y_now_)) break;

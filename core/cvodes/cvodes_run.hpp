@@ -19,6 +19,7 @@
 #include "core/scene/settings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/step/component_tolerances.hpp"
+#include "core/watch/pulse_watch.hpp"
 
 namespace mbsopt::cvodes {
 
@@ -74,6 +75,7 @@ class ForwardRun {
   void set_up();
   bool step_is_followed(double h, const Eigen::VectorXd& y);
   Energy update_statistics(double t, const Eigen::VectorXd& y);
+  double stop_before_pulse(double t, PulseWatch& pulses);
   bool advance(double t, const Hooks& hooks, double& t1);
   void take_samples(SampleSchedule& schedule, double t, const Hooks& hooks);
   void finish_costs();
@@ -95,7 +97,7 @@ class ForwardRun {
   std::vector<bool> left_range_;
   std::string last_words_;  // of CVODES
   Sensitivities* sensitivities_ = nullptr;
-  Eigen::VectorXd y_now_;
+  Eigen::VectorXd y_now_, y_change_;
 
   Context context_;
   Vector y_, y_sample_;

@@ -33,7 +33,8 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
       tolerances_(mechanism.data(), settings.integrator),
       attempt_(mechanism_, settings_, rk_, tolerances_),
       guard_(mechanism_.data()),
-      penalty_(mechanism_.data()) {}
+      penalty_(mechanism_.data()),
+      pulses_(mechanism_, settings.start_time, settings.end_time, pulse_nodes(method)) {}
 
 // Never beyond the end; an adaptive run does not leave a tiny last step.
 double RungeKuttaRun::propose_step(double t, double h, double end, bool adaptive) const {
@@ -229,9 +230,31 @@ bool RungeKuttaRun::choose_size(Course& course) {
 
 RungeKuttaRun::Outcome RungeKuttaRun::try_step(const std::function<bool(double)>& wants_dense, Course& course) {
   const Outcome outcome = attempt_.solve(course.h, course.adaptive, course.options.exact_stages, course.error);
+  if (outcome == Outcome::accepted && !course.options.frozen && passes_over_pulse(course)) return Outcome::rejected;
   const double t1 = attempt_.step.t + course.h;
   attempt_.step.t1 = course.ends_with(t1) ? course.end : t1;
   return outcome == Outcome::accepted ? attempt_.finish(wants_dense(attempt_.step.t1)) : outcome;
+}
+
+// Returns whether to try shorter steps, since this one misses a pulse; its error is that of the pulse.
+bool RungeKuttaRun::passes_over_pulse(Course& course) {
+  constexpr double kMissed = 10;       // tolerances: a step's own estimate errs by less
+  constexpr double kShortest = 1e-10;  // of the run: shorter steps do not search for pulses
+  const double least = std::max(kShortest * course.span, settings_.integrator.options.min_step.value_or(0));
+  double worst = 0;
+  for (const PulseWatch::Doubt& doubt : pulses_.doubts(attempt_.step.t, course.h, course.adaptive)) {
+    const double error = attempt_.change_by(doubt.at, doubt.beside, doubt.duration);
+    if (course.adaptive && course.h > least) {
+      worst = std::max(worst, error);
+      continue;
+    }
+    Pulse& pulse = course.result.statistics.pulse;
+    const double relative = error * settings_.integrator.rtol;
+    if (relative > pulse.error) pulse = doubt.pulse, pulse.error = relative;
+  }
+  if (worst <= kMissed) return false;
+  course.error = worst;
+  return true;
 }
 
 // Returns whether to try the step again, with another size about a singular position.

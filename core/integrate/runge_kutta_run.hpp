@@ -16,6 +16,7 @@
 #include "core/step/step.hpp"
 #include "core/step/step_failure.hpp"
 #include "core/watch/penalty_watch.hpp"
+#include "core/watch/pulse_watch.hpp"
 #include "core/watch/run_guard.hpp"
 
 namespace mbsopt {
@@ -47,6 +48,7 @@ class RungeKuttaRun {
 
   void choose_first_size(Course& course);
   Outcome try_step(const std::function<bool(double)>& wants_dense, Course& course);
+  bool passes_over_pulse(Course& course);
   bool misplaced(Course& course);
   void reject(Outcome outcome, Course& course);
   void choose_next_size(Course& course);
@@ -67,6 +69,7 @@ class RungeKuttaRun {
   StepAttempt attempt_;
   RunGuard guard_;
   PenaltyWatch penalty_;
+  PulseWatch pulses_;
 };
 
 }  // namespace mbsopt

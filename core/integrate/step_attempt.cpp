@@ -161,6 +161,15 @@ StepOutcome StepAttempt::solve(double h, bool adaptive, bool exact, double& erro
   return StepOutcome::accepted;
 }
 
+double StepAttempt::change_by(double at, double beside, double duration) {
+  y_stage_ = step.y0 + (at - step.t) / step.h * (step.y_hat - step.y0);
+  evaluations_ += 2;
+  if (!dynamics.evaluate(beside, y_stage_, step.angles0, work_)) return 0;
+  if (!dynamics.evaluate(at, y_stage_, step.angles0, ydot_)) return 0;
+  work_ = duration * (ydot_ - work_);
+  return scaled_norm(work_, step.y0, step.y_hat, tolerances_);
+}
+
 void StepAttempt::set_y_hat() {
   StageSum sum;
   for (int i = 0; i < rk_.stages; ++i) sum.add(step.h * rk_.b[i], step.K.col(i).data());

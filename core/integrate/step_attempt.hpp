@@ -38,6 +38,9 @@ class StepAttempt {
   StepOutcome solve(double h, bool adaptive, bool exact, double& error);
   StepOutcome finish(bool dense);  // dense stages, projection, branches of the angles
 
+  // The change of velocity in tolerances if the accelerations at `at` and `beside` differ for a duration [s].
+  double change_by(double at, double beside, double duration);
+
   // Returns whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its
   // place.
   bool better_placed_by(double wanted, double largest);

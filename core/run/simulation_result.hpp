@@ -36,6 +36,12 @@ struct Jump {
   bool motion = false;          // and whether it depends on the motion
 };
 
+// A pulse of a signal or of a force's law that a step passes over (pulse_watch.hpp).
+struct Pulse {
+  int signal = -1, force = -1;  // the index in the scene of one of both; none: a table in a law
+  double t = 0, error = 0;      // error: of the velocities, relative
+};
+
 struct SimulationStatistics {
   bool solved =
       false;  // drives leave nothing free: positions were solved, steps are panels of quadrature (core/driven)
@@ -71,6 +77,7 @@ struct SimulationStatistics {
   QuadratureError quadrature, extreme_quadrature, gradient_quadrature;
   std::vector<Jump> jumps;                 // in runs with derivatives
   std::vector<SingularPosition> singular;  // of solved runs: those asked for
+  Pulse pulse;                             // the worst that the steps do not resolve
   // The largest error of a step near a singular position that its projection removed, in tolerances, and its time [s].
   // States within such steps are not projected.
   double projected_error = 0, projected_error_time = 0;

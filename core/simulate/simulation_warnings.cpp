@@ -21,6 +21,7 @@ constexpr double kTakenOut = 1e-4;         // by projections: those of the integ
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
 constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
 constexpr double kWithinSteps = 100;       // tolerances: two of the requested digits
+constexpr double kPulse = 1e-4;            // of velocities: what a pulse adds that fixed steps pass over
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
 constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 
@@ -131,6 +132,21 @@ Warning near_singular(const SimulationSettings& settings, const SimulationStatis
       statistics.projected_error_time, statistics.projected_error * settings.integrator.rtol);
 }
 
+Warning missed_pulse(const Scene& scene, const SimulationStatistics& statistics) {
+  const Pulse& pulse = statistics.pulse;
+  if (!(pulse.error > kPulse)) return {};
+  const auto signal = static_cast<std::size_t>(pulse.signal);
+  const std::string what = pulse.force >= 0
+                               ? "the law of force '" + scene.forces[static_cast<std::size_t>(pulse.force)].name + "'"
+                           : signal < scene.signals.size() ? "signal '" + scene.signals[signal].name + "'"
+                                                           : "a table or spline of a law";
+  return fmt::format(
+      "the steps pass over a pulse of {} near t = {:.6g} s, which changes velocities by {:.1g} of their size: {}", what,
+      pulse.t, pulse.error,
+      scene.simulation.integrator.step ? "take a smaller simulation.integrator.step, or leave it out"
+                                       : "set simulation.integrator.max_step to less than its duration");
+}
+
 }  // namespace
 
 std::string in_words(const Scene& scene, const Jump& jump) {
@@ -172,6 +188,7 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   std::vector<std::string> parameters;
   for (const Parameter& p : scene.parameters) parameters.push_back(p.name);
   if (std::string words = in_words(statistics.singular, parameters); !words.empty()) warnings.push_back(words);
+  add(missed_pulse(scene, statistics));
   for (const Jump& jump : statistics.jumps) warnings.push_back(in_words(scene, jump));
   return warnings;
 }

@@ -20,28 +20,36 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion)
-    : method_(method), costs_(costs), motion_(motion), integrals_(kIntegrals * costs.size()) {
-  for (int i = 0; i < method.nodes; ++i) {
-    node_of_.push_back(-1);
-    if (method.node_b[i] == 0) continue;
-    const auto same = [&](const Node& n) { return std::abs(n.c - method.node_c[i]) < 1e-12; };
-    const auto node = std::find_if(nodes_.begin(), nodes_.end(), same);
-    node_of_.back() = static_cast<int>(node - nodes_.begin());
-    if (node == nodes_.end()) nodes_.push_back({method.node_c[i], 0, 0});
-    nodes_[static_cast<std::size_t>(node_of_.back())].b += method.node_b[i];
+std::vector<QuadratureNode> quadrature_nodes(int n, const double* c, const double* b, std::vector<int>& node_of) {
+  std::vector<QuadratureNode> nodes;
+  for (int i = 0; i < n; ++i) {
+    node_of.push_back(-1);
+    if (b[i] == 0) continue;
+    const auto same = [&](const QuadratureNode& node) { return std::abs(node.c - c[i]) < 1e-12; };
+    const auto node = std::find_if(nodes.begin(), nodes.end(), same);
+    node_of.back() = static_cast<int>(node - nodes.begin());
+    if (node == nodes.end()) nodes.push_back({c[i], 0, 0});
+    nodes[static_cast<std::size_t>(node_of.back())].b += b[i];
   }
   double least = std::numeric_limits<double>::infinity();
-  for (Node& n : nodes_) {
-    n.e = 1;
-    for (const Node& other : nodes_) {
-      if (other.c != n.c) n.e /= n.c - other.c;
+  for (QuadratureNode& node : nodes) {
+    node.e = 1;
+    for (const QuadratureNode& other : nodes) {
+      if (other.c != node.c) node.e /= node.c - other.c;
     }
-    least = std::min(least, std::abs(n.e / n.b));
+    least = std::min(least, std::abs(node.e / node.b));
   }
-  for (Node& n : nodes_) n.e /= least;
-  g_.resize(nodes_.size());
+  for (QuadratureNode& node : nodes) node.e /= least;
+  return nodes;
 }
+
+QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion)
+    : method_(method),
+      costs_(costs),
+      motion_(motion),
+      nodes_(quadrature_nodes(method.nodes, method.node_c, method.node_b, node_of_)),
+      integrals_(kIntegrals * costs.size()),
+      g_(nodes_.size()) {}
 
 std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what) {
   if (start_ == end_) start_ = end_ = step.t;

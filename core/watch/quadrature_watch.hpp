@@ -28,6 +28,13 @@
 
 namespace mbsopt {
 
+// The distinct nodes of a quadrature: time, weight and weight in the null rule, of a step of length 1.
+struct QuadratureNode {
+  double c = 0, b = 0, e = 0;
+};
+// node_of: the place of each of n nodes in this list, -1 if it has no weight.
+std::vector<QuadratureNode> quadrature_nodes(int n, const double* c, const double* b, std::vector<int>& node_of);
+
 class QuadratureWatch {
  public:
   QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion);
@@ -42,9 +49,6 @@ class QuadratureWatch {
   void add_to(SimulationStatistics& statistics) const;
 
  private:
-  struct Node {
-    double c = 0, b = 0, e = 0;
-  };
   struct Integral {
     double of_size = 0, error = 0;  // of |g|; of the estimates
     double worst = 0, worst_t = 0;  // the largest estimate, and when
@@ -56,8 +60,8 @@ class QuadratureWatch {
   const Method& method_;
   std::span<const Cost> costs_;
   MotionSource* motion_;
-  std::vector<Node> nodes_;
-  std::vector<int> node_of_;  // of each node of the method; -1: has no weight
+  std::vector<int> node_of_;
+  const std::vector<QuadratureNode> nodes_;
   std::vector<Integral> integrals_;
   double start_ = 0, end_ = 0;  // of all steps [s], which go forward or backward
   std::vector<double> g_;       // at the nodes
