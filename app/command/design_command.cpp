@@ -277,7 +277,7 @@ int design_command(const CommandContext& context) {
   run.write("optimized.json",
             optimized_problem_text(run, new_values(design), design.mode ? design.mode->bodies : std::vector<Body>{}));
   run.write("history.csv", to_csv(history));
-  if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory);
+  if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory, after.simulation.statistics.singular);
   run.write("report.html",
             design_report(scene, design.rho, run.result, history, {before.trajectory, before.forces, before.running},
                           {after.trajectory, after.forces, after.running}, sensor_limits(run.problem),

@@ -43,17 +43,25 @@ struct DriveEfforts {
       table.columns.push_back(d.drive_names[static_cast<std::size_t>(law.drive)]);
     }
   }
-  // Keeps the efforts if they are finite, and returns whether they are. A NaN has no limit at a singular position.
+  // Keeps the efforts if they are finite, and returns whether they are. NaN may have no limit at a singular position.
   bool record(const StatePoint& at) {
     std::vector<double> row{at.t};
     const Motion& motion = at.motion->motion(at);
     for (const int r : rows) row.push_back(-motion.lambda(r));
-    if (std::ranges::any_of(row, [](double x) { return std::isnan(x); })) return true;
-    if (!std::ranges::all_of(row, [](double x) { return std::isfinite(x); })) return false;
+    if (std::ranges::any_of(row, [](double x) { return std::isinf(x); })) return false;
     table.rows.push_back(std::move(row));
     return true;
   }
 };
+
+// Returns whether all efforts that have a limit are numbers.
+bool are_numbers(const DriveEfforts& efforts, const KinematicsResult& kinematics) {
+  return std::ranges::all_of(efforts.table.rows, [&](const std::vector<double>& row) {
+    return std::ranges::none_of(row, [](double x) { return std::isnan(x); }) ||
+           std::ranges::any_of(kinematics.singular,
+                               [&](const SingularPosition& s) { return std::abs(row[0] - s.t) < s.half; });
+  });
+}
 
 void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
   if (efforts.rows.empty() || efforts.table.rows.empty()) return;
@@ -116,6 +124,7 @@ int kinematics_command(const CommandContext& context) {
         return !interrupted();
       });
   run.progress.finish();
+  finite = finite && are_numbers(efforts, kinematics);
   statistics.steps = kinematics.steps;
   statistics.max_position_violation = kinematics.max_position_violation;
   statistics.max_velocity_violation = kinematics.max_velocity_violation;
@@ -127,7 +136,7 @@ int kinematics_command(const CommandContext& context) {
       settings.start_time, kinematics.last_good_time, trajectory.rows.size(), kinematics.steps,
       kinematics.max_position_violation, kinematics.max_velocity_violation);
   const bool motion_ends_early = interrupted();
-  write_trajectory(run, trajectory);
+  write_trajectory(run, trajectory, kinematics.singular);
   if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
   add_drives(run, scene, efforts);
   const std::vector<PlotInstant> singular = add_singular(run, kinematics);

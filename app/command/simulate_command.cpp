@@ -59,7 +59,7 @@ int simulate_command(const CommandContext& context) {
     Scene simulated = scene;
     if (!simulation.ok()) simulated.simulation.end_time = simulation.last_good_time;
     print_simulation(context.out, simulated, simulation.statistics);
-    write_trajectory(run, motion.trajectory);
+    write_trajectory(run, motion.trajectory, simulation.statistics.singular);
     for (const std::string& warning : simulation_warnings(scene, simulation.statistics, simulation.ok()))
       run.warn(warning);
     warn_of_stiffness(run, simulation.statistics, false);

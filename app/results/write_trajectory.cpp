@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "app/results/trajectory_gnuplot.hpp"
@@ -10,9 +11,11 @@
 
 namespace mbsopt {
 
-void write_trajectory(Run& run, const Trajectory& trajectory) {
+void write_trajectory(Run& run, const Trajectory& trajectory, const std::vector<SingularPosition>& singular) {
   std::vector<std::optional<double>> first_missing(trajectory.columns.size());  // [s], per column
   for (const std::vector<double>& row : trajectory.rows) {
+    const auto contains = [&](const SingularPosition& s) { return std::abs(row.front() - s.t) < s.half; };
+    if (std::ranges::any_of(singular, contains)) continue;  // their warning names what is missing
     for (std::size_t k = 0; k < row.size(); ++k) {
       if (!std::isfinite(row[k]) && !first_missing[k]) first_missing[k] = row.front();
     }

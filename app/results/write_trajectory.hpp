@@ -7,6 +7,6 @@ namespace mbsopt {
 
 // Writes trajectory.csv; with --mat and --gnuplot also trajectory.mat and trajectory.gp. Warns of each column with
 // empty cells. Ctrl-C stops the run without the files.
-void write_trajectory(Run& run, const Trajectory& trajectory);
+void write_trajectory(Run& run, const Trajectory& trajectory, const std::vector<SingularPosition>& singular);
 
 }  // namespace mbsopt

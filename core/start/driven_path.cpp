@@ -179,7 +179,9 @@ void DrivenPath::look_for_window() {
   double error = kAccepted;
   for (int k = 0; k < kHalvings && error > kExact; ++k) {
     SingularWindow tried{w.nodes.empty() ? low : w.t, std::ldexp(whole, -k), {}};
-    for (const double part : {1.0, 0.1, 0.01}) tried.t = locate(tried.t, part * tried.half, base);
+    tried.t = locate(tried.t, tried.half, base);
+    for (const double spacing : {0.1 * tried.half, 0.01 * tried.half})
+      if (const double finer = locate(tried.t, spacing, base); std::abs(finer - tried.t) < spacing) tried.t = finer;
     if (const double now = fill(tried, base); now < error) error = now, w = std::move(tried);
   }
   state_ = here;

@@ -304,6 +304,10 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
       if (result.singular.empty() || result.singular.back().t != w->t)
         result.singular.push_back(singular_position(mechanism, w->t, w->state_at(w->t).y, w->half));
       for (const std::string& name : lacking_sensors(mechanism, k.point())) result.singular.back().note(name);
+      const MechanismData& d = mechanism.data();
+      for (const RowLaw& law : d.laws)
+        if (law.drive >= 0 && std::isnan(k.point().motion->motion(k.point()).lambda(law.row)))
+          result.singular.back().note("drive '" + d.drive_names[static_cast<std::size_t>(law.drive)] + "'");
     } else if (k.is_uncertain()) {
       result.singular.push_back(singular_position(mechanism, k.t(), k.point().y, 0));
     }

@@ -22,7 +22,7 @@ namespace {
 //
 //   T = m g r cos(theta),   dT/dm = g r cos(theta),   dT/dr = m g cos(theta)
 //
-// The tension of the coupler has a pole in line once the right crank has a weight beside its hinge.
+// The tension of the coupler has a pole in line if the right crank has a weight beside its hinge.
 Scene parallelogram(const std::string& coupler = "0.9") {
   Scene s;
   add_parameters(s, {{"m", 1.3}, {"r", 0.4}, {"b", 0.9}, {"w", 2.0}});
@@ -123,8 +123,8 @@ TEST_CASE("a tension without a limit is left out and named, and a parameter that
        {simulate_tlm(m, scene.simulation, costs), simulate_adjoint(m, scene.simulation, costs)}) {
     REQUIRE(differentiated.ok());
     REQUIRE_FALSE(differentiated.statistics.singular.empty());
-    CHECK(std::ranges::find(differentiated.statistics.singular.front().parameters, 2) !=
-          differentiated.statistics.singular.front().parameters.end());
+    CHECK(std::ranges::any_of(differentiated.statistics.singular,
+                              [](const SingularPosition& p) { return std::ranges::count(p.parameters, 2) > 0; }));
   }
   costs[1].samples[0].cost = std::make_shared<SensorProduct>(m, 3, 3);
   CHECK_THAT(simulate(m, scene.simulation, costs).message, Catch::Contains("singular position at t = 1.22"));
