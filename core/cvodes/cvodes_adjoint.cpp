@@ -4,6 +4,7 @@
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "core/body/state_layout.hpp"
@@ -172,7 +173,6 @@ void Adjoint::create_backward() {
   run_.require(CVodeSVtolerancesB(memory, which_, s.rtol, atol));
   run_.require(CVodeSetMaxNumStepsB(memory, which_, s.max_steps));
   if (s.options.min_step) run_.require(CVodeSetMinStepB(memory, which_, *s.options.min_step));
-  if (s.max_step) run_.require(CVodeSetMaxStepB(memory, which_, *s.max_step));
   if (stiff) {
     if (!linear_solver_.attach_backward(memory, which_)) run_.require(CV_ILL_INPUT);
   } else {
@@ -192,26 +192,42 @@ void Adjoint::failed(int flag) {
   run_.result().message += ". This happened in the backward run of the adjoint";
 }
 
+// The largest step back from t that is at most twice any forward step it overlaps. Longer ones could pass over what the
+// forward run met there.
+double Adjoint::largest_step(double t) const {
+  const StepSequence& steps = run_.result().steps;
+  double least = std::numeric_limits<double>::infinity();
+  for (auto j = static_cast<std::size_t>(std::ranges::lower_bound(steps.times, t) - steps.times.begin()); j-- > 0;) {
+    const double before = t - (steps.times[j] + steps.sizes[j]);  // what lies between
+    if (2 * std::min(least, steps.sizes[j]) <= before) return std::min(2 * least, before);
+    least = std::min(least, steps.sizes[j]);
+  }
+  return 2 * least;
+}
+
 bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
-  // The sweep stops at these times only to ask whether to continue. They are interpolated and cost nothing.
-  constexpr int kPauses = 50;
-  const double pause = (settings_.end_time - settings_.start_time) / kPauses;
-  for (double next = from; next > t;) {
-    next = next - pause > t + tie_ ? next - pause : t;
-    const int flag = CVodeB(run_.memory(), next, CV_NORMAL);
+  const IntegratorSettings& s = settings_.integrator;
+  void* const backward = CVodeGetAdjCVodeBmem(run_.memory(), which_);
+  double h = 0;  // of the next step, which CVODES has chosen; the limit is for the one after it
+  for (double now = from; now > t;) {
+    const double largest = std::min(largest_step(now - h), s.max_step.value_or(INFINITY));
+    run_.require(CVodeSetMaxStepB(run_.memory(), which_, std::max(largest, s.options.min_step.value_or(0))));
+    const int flag = CVodeB(run_.memory(), t, CV_ONE_STEP);
     run_.flow().thrown().throw_on();
     if (flag < 0) {
       failed(flag);
       return false;
     }
+    run_.require(CVodeGetCurrentTime(backward, &now));
+    run_.require(CVodeGetCurrentStep(backward, &h));
+    h = std::abs(h);
     if (options.progress && !options.progress(settings_.end_time)) {
-      run_.stop(SimulationStatus::stopped, fmt::format("stopped in the backward run, at t = {:.6g} s", next));
+      run_.stop(SimulationStatus::stopped, fmt::format("stopped in the backward run, at t = {:.6g} s", now));
       return false;
     }
   }
-  double reached = t;
-  run_.require(CVodeGetB(run_.memory(), which_, &reached, lambda_vector_));
-  if (active_ > 0) run_.require(CVodeGetQuadB(run_.memory(), which_, &reached, mu_vector_));
+  run_.require(CVodeGetDky(backward, t, 0, lambda_vector_));
+  if (active_ > 0) run_.require(CVodeGetQuadDky(backward, t, 0, mu_vector_));
   lambda_ = Eigen::Map<const Eigen::MatrixXd>((*lambda_vector_).data(), states_, objectives_);
   return true;
 }

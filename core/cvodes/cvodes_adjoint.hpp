@@ -3,8 +3,8 @@
 //   lambda' = -f_y'lambda - g_y,      mu' = -(f_rho'lambda + g_rho),
 // backward from lambda(T) = d terminal/dy, mu(T) = d terminal/drho. At the time of a sampled cost lambda jumps by its
 // gradient. A multistep method cannot step over a jump: it starts again there, at order one. mu is a quadrature with an
-// error control of its own. The forward solution is the method's polynomial between stored steps. CVODES uses
-// checkpoints if there are too many steps to store.
+// error control of its own. Its steps are bounded by the forward ones. The forward solution is the method's polynomial
+// between stored steps. CVODES uses checkpoints if there are too many steps to store.
 #pragma once
 
 #include <cstddef>
@@ -44,6 +44,7 @@ class Adjoint {
   void begin();                                          // terminal costs
   void take_jumps(double t);                             // of samples at or after t
   void create_backward();
+  double largest_step(double t) const;
   bool go_back_to(double t, double from, const RunOptions& options);
   void failed(int flag);
 

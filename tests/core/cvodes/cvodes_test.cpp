@@ -460,3 +460,25 @@ TEST_CASE("what a user's cost throws comes through CVODES as it was thrown", "[c
   CHECK_THROWS_AS(simulate_tlm(mechanism, scene.simulation, costs), std::out_of_range);
   CHECK_THROWS_AS(simulate_adjoint(mechanism, scene.simulation, costs), std::out_of_range);
 }
+
+// A bar turns by itself for 1 s, meets a stop for some 10 ms, and turns back by itself for 5 s.
+TEST_CASE("the adjoint of CVODES does not step over a stop that the forward run met", "[cvodes][gradient]") {
+  Scene s = pendulum();
+  add_parameters(s, {{"w", 0.5}});
+  s.gravity = {0.0, 0.0, 0.0};
+  Rsda stop;
+  stop.joint = "A", stop.law = f("-1e6*max(0, angle - 0.5)^2");
+  s.forces = {{"stop", stop}};
+  s.conditions = {value_of("theta", "0"), rate_of("theta", "w")};
+  s.simulation.end_time = 6;
+  const SimulationSettings settings = by(GENERATE(as<std::string>{}, "cvodes_adams", "cvodes_bdf"), 1e-9, s.simulation);
+  const Mechanism m(s, nominal(s));
+  Cost cost;
+  cost.terminal = product(m, "theta", "theta");
+  const SimulationResult forward = simulate_tlm(m, settings, {&cost, 1});
+  const SimulationResult adjoint = simulate_adjoint(m, settings, {&cost, 1});
+  INFO(forward.message << adjoint.message);
+  REQUIRE((forward.ok() && adjoint.ok()));
+  const double exact = forward.psi_rho.cwiseAbs().maxCoeff();
+  CHECK((adjoint.psi_rho - forward.psi_rho).cwiseAbs().maxCoeff() < 1e-3 * exact);
+}
