@@ -36,9 +36,9 @@ class ProgramBuilder {
   static std::vector<Program> time_parts_of(const Program& program, int parameters, int time);  // time_parts.hpp
   static std::vector<int> terms_of(const Program& part, int time);                              // time_parts.cpp
   static void ranges_of(const Program& program, std::span<const Range> x, std::vector<Range>& range);
-  // Builds the first of two instructions of another program (how: name), its cosine (cos), its reciprocal (divide) or
-  // their difference (subtract).
-  void build_switch(const Program& of, Operation how, int a, int b);
+  // Builds the first of two instructions of another program (how: name), its cosine (cos), its reciprocal (divide),
+  // their difference (subtract) or the distance of the first from a number (number).
+  void build_switch(const Program& of, Operation how, int a, int b, double from = 0);
 
  private:
   using Instruction = Program::Instruction;

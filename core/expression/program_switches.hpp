@@ -1,7 +1,7 @@
-// The switches of a program: functions of its inputs at whose zeros its value may jump. They are denominators, bases of
-// powers, both arguments of atan2, and the cosine of the argument of tan. The arguments of kinks, squares and choices
-// of derivatives are switches, too, since denominators may touch zero there. The value need not jump (sin(x)/x).
-// Functions without inputs are left out. The list is empty if nothing can jump.
+// The switches of a program: functions of its inputs at whose zeros its value or slope may jump. They are denominators,
+// bases of powers, arguments of atan2, the cosine of the argument of tan, and arguments of kinks (abs, min, max,
+// corners of tables) and sharp turns (tanh, atan, smooth_abs). Squares and choices of derivatives are, too, if
+// denominators may touch zero there. Neither need jump (sin(x)/x). Functions without inputs are left out.
 //
 //   for (const Program& s : switches_of(law)) s.value(inputs, scratch);   // abs(t - tp)/(t - tp): t - tp
 #pragma once

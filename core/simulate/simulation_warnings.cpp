@@ -111,7 +111,7 @@ Warning contradicting_joints(const SimulationSettings& settings, const Simulatio
 // first: what to try before shorter steps, a sentence.
 Warning unresolved(const SimulationSettings& settings, bool solved, const QuadratureError& worst, const char* what,
                    const char* consequence, const char* first = "") {
-  if (!(worst.error > kUnresolved)) return {};
+  if (!(worst.error > kUnresolved) || worst.of.empty()) return {};
   constexpr const char* kCvodes = ", or take cvodes_bdf or cvodes_adams, which control this error";
   return fmt::format(
       "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
@@ -158,6 +158,8 @@ std::string in_words(const Scene& scene, const Jump& jump) {
   for (const int k : jump.parameters)
     causes += (causes.empty() ? "'" : ", '") + scene.parameters[static_cast<std::size_t>(k)].name + "'";
   if (jump.motion) causes += causes.empty() ? "the motion, and so on the parameters" : " and the motion";
+  if (jump.size == 0)
+    return fmt::format("{} has a kink at t = {:.6g} s, an instant that depends on {}", what, jump.t, causes);
   return fmt::format(
       "{} jumps by {:.3g} at t = {:.6g} s, an instant that depends on {}: gradients leave out how it moves, so that "
       "they may be wrong, even 0. Let the value pass smoothly over a short time, by tanh(x/eps) or smooth_abs(x, eps)",
@@ -189,7 +191,8 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   for (const Parameter& p : scene.parameters) parameters.push_back(p.name);
   if (std::string words = in_words(statistics.singular, parameters); !words.empty()) warnings.push_back(words);
   add(missed_pulse(scene, statistics));
-  for (const Jump& jump : statistics.jumps) warnings.push_back(in_words(scene, jump));
+  for (const Jump& jump : statistics.jumps)
+    if (jump.size != 0) warnings.push_back(in_words(scene, jump));  // kinks: gradient_doubts.hpp
   return warnings;
 }
 

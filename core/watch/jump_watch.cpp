@@ -17,6 +17,10 @@ constexpr double kFar = 1e-2, kNear = 1e-4;  // from the zero, of the interval
 constexpr double kKept = 0.5;                // of the far difference by the near one: |x|^0.15 keeps it, a kink 0.01
 constexpr double kLeastJump = 1e-6;          // of the value: cancellation next to sin(x)/x is less
 constexpr int kBisections = 60;              // to the rounding of theta
+constexpr double kLeastBend = 1e-6;          // change of slope over a step, of the value
+constexpr double kRoot = 0.05;               // as kKept: x^1.5 from a contact on keeps 0.1 of its bend, x^2 0.01
+constexpr double kTurn = 0.1;                // away from its chord, of the change over a step
+constexpr int kMostTries = 100;              // of switches at which nothing jumps
 
 double sign_of(double x) { return x > 0 ? 1 : (x < 0 ? -1 : 0); }
 
@@ -48,6 +52,7 @@ JumpWatch::JumpWatch(const Mechanism& mechanism, const SimulationSettings& setti
 
 bool JumpWatch::Function::is_new(const Switch& s) const {
   const auto is_known = [&](int k) { return std::find(parameters.begin(), parameters.end(), k) != parameters.end(); };
+  if (s.searches > kMostTries) return false;
   return (s.motion && !motion) || !std::all_of(s.parameters.begin(), s.parameters.end(), is_known);
 }
 
@@ -56,9 +61,9 @@ void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Pr
   const MechanismData& d = mechanism_.data();
   const int P = static_cast<int>(d.rho.size());
   const int time = of == Of::law ? P + 2 : P;
-  Function f{jump, &program, of, place, {}, {}, false};
+  Function f{jump, &program, of, place, {}, {}, false, false};
   for (const Program& p : switches) {
-    Switch s{{}, {}, false, 0, 0};
+    Switch s{{}, {}, false, 0, 0, 0};
     bool varies = false;
     for (const int input : p.used_inputs()) {
       varies = varies || input >= P, s.motion = s.motion || (input >= P && input != time);
@@ -129,25 +134,39 @@ bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
     const double middle = 0.5 * (from + to);
     (sign_of(value(f, s.program, middle)) == s.now ? to : from) = middle;
   }
-  const auto jump = [&](double distance, double& size) {
-    const double before = value(f, *f.program, to - distance), after = value(f, *f.program, to + distance);
-    size = std::max({size, std::abs(before), std::abs(after)});
-    return std::abs(after - before);
+  ++s.searches;
+  struct Change {
+    double jump, bend;
   };
   double size = 0;
-  const double far = jump(kFar, size), near = jump(kNear, size);
-  if (!std::isfinite(size) || !(near > kLeastJump * size) || near < kKept * far) return false;
-  f.jump.size = near, f.jump.t = t0_ + to * (t1_ - t0_);
+  const auto change = [&](double distance) -> Change {
+    const double before = value(f, *f.program, to - distance), after = value(f, *f.program, to + distance);
+    size = std::max({size, std::abs(before), std::abs(after)});
+    return {std::abs(after - before), std::abs(before - 2 * value(f, *f.program, to) + after) / distance};
+  };
+  const Change far = change(kFar), near = change(kNear);
+  const bool jumps = near.jump > kLeastJump * size && near.jump >= kKept * far.jump;
+  const bool kink = near.bend > kLeastBend * size && near.bend >= kRoot * far.bend;
+  // A smooth function may turn within the interval, too, so that stages do not resolve its slope.
+  const double f0 = value(f, *f.program, 0), f1 = value(f, *f.program, 1);
+  double turn = 0;
+  for (const double theta : {0.25, 0.75})
+    turn = std::max(turn, std::abs(value(f, *f.program, theta) - (1 - theta) * f0 - theta * f1));
+  const bool bends = kink || turn > kTurn * std::abs(f1 - f0);
+  if (!std::isfinite(size) || !(jumps || (bends && !f.bends))) return false;
+  f.jump.size = jumps ? near.jump : 0, f.jump.t = t0_ + to * (t1_ - t0_);
   f.jump.parameters = s.parameters, f.jump.motion = s.motion;
   found_.push_back(f.jump);
+  if (!jumps) return f.bends = true;
   f.parameters.insert(f.parameters.end(), s.parameters.begin(), s.parameters.end());
   f.motion = f.motion || s.motion;
   return true;
 }
 
 void JumpWatch::look_at(const StatePoint& at) {
-  if (functions_.empty() || at.t < t0_ + apart_) return;
+  if (at.t < t0_ + apart_) return;
   t1_ = at.t, y1_ = at.y;
+  look_at_directions();
   for (Function& f : functions_) {
     if (f.switches.empty()) continue;
     bool found = false;
@@ -164,6 +183,19 @@ void JumpWatch::look_at(const StatePoint& at) {
     if (found) std::erase_if(f.switches, [&](const Switch& s) { return !f.is_new(s); });
   }
   t0_ = t1_, y0_ = y1_, angles_ = at.angles;
+}
+
+void JumpWatch::look_at_directions() {
+  constexpr double kTurned = 0.5;  // the cosine
+  for (const TsdaForce& f : mechanism_.data().forces->of<TsdaForce>()) {
+    const auto direction = [&](const Eigen::VectorXd& y) {
+      return f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).u;
+    };
+    const auto is_known = [&](const Jump& j) { return j.size == 0 && j.of == Jump::Of::force && j.index == f.force; };
+    if (f.is_k_times_d() || direction(y0_).dot(direction(y1_)) > kTurned || std::ranges::any_of(found_, is_known))
+      continue;
+    found_.push_back({Jump::Of::force, f.force, {}, 0, t1_, {}, true});
+  }
 }
 
 void JumpWatch::add_to(SimulationStatistics& statistics) const { statistics.jumps = found_; }

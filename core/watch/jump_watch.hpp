@@ -6,6 +6,12 @@
 // keeps its size at a hundredth of the distance from the zero; a continuous value does not. A later jump of the same
 // function is reported if it depends on more: on another parameter, or also on the motion.
 //
+// Kinks are found in the same way. Steps across a kink give the value to their tolerance. Its derivative is that of the
+// branches that the stages took, with an error of the order of the step. Along the cubic, the second difference over d,
+// divided by d, is the change of slope for any d; that of a smooth function falls as d. A kink is noted as a jump of
+// size 0. So is a spring near zero length that turns by more than 60 degrees in a step. Whether gradients are wrong is
+// for others to decide (gradient_doubts.hpp).
+//
 //   JumpWatch watch(mechanism, settings, costs, motion);   // in runs with derivatives
 //   watch.begin({t0, y0, angles0}); watch.look_at({t1, y1, angles1}); ... watch.add_to(result.statistics);
 #pragma once
@@ -39,6 +45,7 @@ class JumpWatch {
     std::vector<int> parameters;  // active ones that it uses
     bool motion = false;          // it uses the state
     double last = 0, now = 0;     // its last sign other than 0; its present sign
+    int searches = 0;
   };
   struct Function {
     Jump jump;  // the known part
@@ -48,6 +55,7 @@ class JumpWatch {
     std::vector<Switch> switches;
     std::vector<int> parameters;         // named by its reported jumps
     bool motion = false;                 // some of them name the motion
+    bool bends = false;                  // a kink was reported
     bool is_new(const Switch& s) const;  // names more
   };
   // switches are those of the program.
@@ -55,7 +63,8 @@ class JumpWatch {
   void set_inputs(const Function& f, const StatePoint& at);
   void place_at(double theta);  // sets t_, y_ between the last state and the present one
   void set_inputs_at(double theta, const Function& f);
-  bool search(Function& f, Switch& s, double from, double to);  // whether a jump was reported
+  bool search(Function& f, Switch& s, double from, double to);  // whether a jump or kink was reported
+  void look_at_directions();                                    // of springs
   double value(const Function& f, const Program& p, double theta);
 
   const Mechanism mechanism_;

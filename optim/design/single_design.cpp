@@ -1,5 +1,6 @@
 #include "optim/design/single_design.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <functional>
 #include <string>
@@ -84,9 +85,11 @@ class SingleDesign {
   }
 
   void add_warnings() {
-    if (result_.final_evaluation.statistics.jumps.empty())  // those of the solution stand beside it
+    const auto jumps = [](const Jump& jump) { return jump.size != 0; };
+    if (std::ranges::none_of(result_.final_evaluation.statistics.jumps, jumps))  // those of the solution beside it
       for (const Jump& jump : start_.statistics.jumps)
-        result_.warnings.push_back("at the start, " + in_words(prepared_.evaluator.of_case(0).scene(), jump));
+        if (jumps(jump))
+          result_.warnings.push_back("at the start, " + in_words(prepared_.evaluator.of_case(0).scene(), jump));
     if (!program_.hessian_failure().empty())
       result_.warnings.push_back(
           "design.optimizer.hessian: could not be computed everywhere, where it was not the one "

@@ -6,14 +6,17 @@
 
 using namespace mbsopt;
 
-TEST_CASE("a program's switches are what its value may jump with", "[expression]") {
+TEST_CASE("a program's switches are what its value or its slope may jump with", "[expression]") {
   Symbols symbols;
   for (const char* name : {"x", "y"}) symbols.add_input(name);
   struct Case {
     const char* expression;
     std::vector<double> at_2_3;  // the switches at x = 2, y = 3
   };
-  const std::vector<Case> cases{{"x*y + abs(x) + min(x, y)", {}},
+  const std::vector<Case> cases{{"x*y + abs(x) + min(x, y)", {-1, 2}},
+                                {"x^2 + y*y + sin(x)", {}},
+                                {"table(x, [0, 1, 2.5, 4], [0, 1, 2.6, -3])", {-0.5, 1}},
+                                {"tanh(x/3)", {2. / 3}},
                                 {"abs(x - y)/(x - y)", {-1}},
                                 {"x/sqrt(x^2)", {2, 2}},
                                 {"x/2 + y/pi", {}},

@@ -110,3 +110,33 @@ TEST_CASE("nothing is said of a jump where no derivative is carried", "[gradient
   CHECK(simulate_tlm(mechanism, s.simulation).statistics.jumps.empty());
   CHECK(simulate(Mechanism(s, nominal(s)), s.simulation).statistics.jumps.empty());
 }
+
+// A bar turns at a constant rate until a spring of one side catches it at 0.2 rad, at t = 0.4 s.
+TEST_CASE("a kink that the motion crosses is noted with its instant, and smooth laws are not", "[gradient]") {
+  struct Case {
+    const char* law;
+    bool kink;
+  };
+  const Case cases[] = {{"-3*max(0, angle - 0.2)", true},
+                        {"-3*abs(angle - 0.2) + 3*(0.2 - angle)", true},
+                        {"-3*max(0, angle - 0.2)^1.5", true},
+                        {"-3*max(0, angle - 0.2)^3", true},
+                        {"-table(angle, [-9, 0.2, 9], [0, 0, 30])", true},
+                        {"-0.1*tanh((angle - 0.2)/1e-7)", true},
+                        {"-0.1*tanh(angle - 0.2)", false},
+                        {"-3*max(0, angle - 2)", false}};
+  for (const Case& c : cases) {
+    Scene s = with_law(turned_bar("0"), c.law);
+    s.conditions = {value_of("theta", "0"), rate_of("theta", "0.5")};
+    const SimulationResult run = simulate_tlm(Mechanism(s, nominal(s)), s.simulation);
+    INFO(c.law << ": " << run.message);
+    REQUIRE(run.ok());
+    REQUIRE(run.statistics.jumps.size() == (c.kink ? 1U : 0U));
+    if (!c.kink) continue;
+    CHECK(run.statistics.jumps[0].size == 0);
+    CHECK(run.statistics.jumps[0].motion);
+    if (std::string(c.law).find("tanh") == std::string::npos)
+      CHECK(run.statistics.jumps[0].t == Approx(0.4).epsilon(1e-6));
+    CHECK(simulation_warnings(s, run.statistics).empty());
+  }
+}
