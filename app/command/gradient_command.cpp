@@ -16,8 +16,8 @@
 #include "app/terminal/text_table.hpp"
 #include "core/cvodes/cvodes.hpp"
 #include "optim/objective/evaluator.hpp"
+#include "optim/objective/gradient_doubts.hpp"
 #include "optim/objective/hessian.hpp"
-#include "optim/objective/integration_error.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt {
@@ -82,19 +82,6 @@ void add_second_derivatives(Run& run, Evaluator& evaluator) {
   for (const std::string& warning : hessian_warnings(found, objectives)) run.warn(warning);
 }
 
-void warn_of_unresolved(Run& run, const Evaluator& evaluator, const Evaluation& evaluation) {
-  const IntegrationError error =
-      integration_error(evaluator.scene(), evaluator.objectives(), evaluation.psi, evaluation.psi_rho,
-                        {.progress = run.watched("estimating the error"),
-                         .method = evaluator.options().method,
-                         .fixed_steps = true,
-                         .steps = evaluation.statistics.steps});
-  run.progress.finish();
-  for (const std::string& doubt :
-       unresolved_gradients(evaluator.scene(), evaluator.objectives(), evaluation.psi, evaluation.psi_rho, error))
-    run.warn(doubt);
-}
-
 }  // namespace
 
 int gradient_command(const CommandContext& context) {
@@ -130,8 +117,8 @@ int gradient_command(const CommandContext& context) {
   run.result["simulation"] = to_json(evaluation.statistics);
   add_derivative_counts(run, needed.scene, evaluation.statistics);
   for (const std::string& warning : evaluation.warnings) run.warn(warning);
-  if (evaluation.ok && may_be_unresolved(needed.scene, evaluator.objectives(), evaluation))
-    warn_of_unresolved(run, evaluator, evaluation);
+  for (const std::string& doubt : gradient_doubts(evaluator, evaluation)) run.warn(doubt);
+  run.progress.finish();
   if (!evaluation.ok) {
     interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
     return run.finish();

@@ -53,7 +53,7 @@ Json to_json(const SimulationStatistics& statistics) {
   for (const auto& [key, worst] : {std::pair{"quadrature_error", &statistics.quadrature},
                                    {"extreme_quadrature_error", &statistics.extreme_quadrature},
                                    {"gradient_quadrature_error", &statistics.gradient_quadrature}})
-    if (worst->error > 0) json[key] = worst->error;
+    if (worst->error > 0 && !worst->of.empty()) json[key] = worst->error;
   if (statistics.watched_steps > 0) {
     json["watched_steps"] = statistics.watched_steps;
     json["stability_limited_steps"] = statistics.stability_limited_steps;

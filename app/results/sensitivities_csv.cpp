@@ -2,11 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "app/results/trajectory_csv.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/state_point.hpp"
+#include "core/simulate/simulation_warnings.hpp"
+#include "optim/objective/integration_error.hpp"
 
 namespace mbsopt {
 
@@ -29,6 +33,7 @@ void write_sensitivities(Run& run) {
   Eigen::VectorXd y_bar(mechanism.states()), gradient(mechanism.parameters());
   TangentSampling sampling;
   sampling.times = output_times(scene.simulation);
+  std::vector<std::vector<double>> rows;
   // s(y(rho), rho):  ds/drho = s_rho + (dy/drho)' s_y
   sampling.observe = [&](std::size_t, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
     std::vector<double> row{at.t};
@@ -39,7 +44,7 @@ void write_sensitivities(Run& run) {
       gradient.noalias() += y_rho.transpose() * y_bar;
       row.insert(row.end(), gradient.begin(), gradient.end());
     }
-    table.rows.push_back(std::move(row));
+    rows.push_back(std::move(row));
   };
   RunOptions options;
   options.progress = run.watched("differentiating");
@@ -47,7 +52,25 @@ void write_sensitivities(Run& run) {
   run.progress.finish();
   if (result.status == SimulationStatus::stopped) return run.stopped("there is no sensitivities.csv");
   if (!result.ok()) return run.failed("no sensitivities: " + result.message, result.last_good_time);
+  table.rows.swap(rows), rows.clear();
   run.write("sensitivities.csv", to_csv(table));
+  // Steps across a kink do not know its instant: other tolerances tell whether that matters.
+  const auto kink = std::ranges::find(result.statistics.jumps, 0.0, &Jump::size);
+  if (kink == result.statistics.jumps.end()) return;
+  const Scene tight = with_errors_times(0.1, scene, result.statistics.steps);
+  if (!simulate_tlm(mechanism, tight.simulation, {}, sampling, options).ok()) return;
+  constexpr double kResolved = 1e-4;  // of a column: as of gradients
+  for (std::size_t c = 1; c < table.columns.size(); ++c) {
+    double largest = 0, change = 0;
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      largest = std::max(largest, std::abs(rows[i][c])),
+      change = std::max(change, std::abs(rows[i][c] - table.rows[i][c]));
+    if (change > kResolved * largest)
+      return run.warn(
+          fmt::format("the steps do not resolve the sensitivities: a tenth of the integration errors changes "
+                      "{} by {:.2g}. {}. Tighten simulation.integrator.rtol and atol, or round the kink",
+                      table.columns[c], change, in_words(scene, *kink)));
+  }
 }
 
 }  // namespace mbsopt

@@ -72,8 +72,16 @@ void AdjointSweep::sample_back(const StoredStep& step) {
   }
 }
 
+double AdjointSweep::magnification(const Eigen::VectorXd& psi) const {
+  double most = 0;
+  for (Eigen::Index o = 0; o < psi.size(); ++o)
+    if (psi(o) != 0) most = std::max(most, bars_[static_cast<std::size_t>(o)].largest / std::abs(psi(o)));
+  return most;
+}
+
 bool AdjointSweep::step_back(const StoredStep& step) {
   rebuild(step);
+  for (Bars& b : bars_) b.largest = std::max(b.largest, b.lambda.cwiseAbs().dot(step_.y1.cwiseAbs()));
   for (Bars& b : bars_) b.lambda_hat.setZero(), b.samples.setZero(), b.K.setZero();
   sample_back(step);
   if (rosenbrock_) nodes_back();

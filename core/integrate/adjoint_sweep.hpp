@@ -33,6 +33,9 @@ class AdjointSweep {
   Eigen::MatrixXd lambda() const;
   Eigen::MatrixXd mu() const;
 
+  // The largest change of an objective by a change of the state, both relative, over all steps.
+  double magnification(const Eigen::VectorXd& psi) const;
+
   long linearised_states() const {
     return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0) +
            (rosenbrock_ ? rosenbrock_->linearised_states() : 0);
@@ -49,6 +52,7 @@ class AdjointSweep {
     Eigen::VectorXd theta, rho;          // of all that was swept
     Eigen::VectorXd samples;             // what samples in the step see of y0
     Eigen::VectorXd start, common;       // of f(t0, y0); of D(h, h k_0) there: by a Rosenbrock method
+    double largest = 0;                  // of sum_i |lambda_i y_i| over all steps
     Eigen::MatrixXd K;                   // of the stages' derivatives, without what explicit stages after them see
     Eigen::MatrixXd Y;                   // of the stages; those of implicit groups are used up within their group
   };

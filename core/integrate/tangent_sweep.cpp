@@ -1,5 +1,8 @@
 #include "core/integrate/tangent_sweep.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/integrate/model_choice.hpp"
 #include "core/linear/block_kernels.hpp"
 
@@ -267,7 +270,14 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
     for (Block& b : blocks_) b.y1 = b.y_hat;
   }
   take_samples(step, events, sampling, psi_rho);
-  for (Block& b : blocks_) b.y0 = b.y1;
+  const double largest_of_y = step.y1.cwiseAbs().maxCoeff();
+  for (Block& b : blocks_) {
+    b.y0 = b.y1;
+    const Lanes<1> largest = b.y1.cwiseAbs().colwise().maxCoeff();
+    for (int k = 0; k < kLanes; ++k)
+      if (const int p = b.parameters.parameter[k]; p >= 0)
+        magnification_ = std::max(magnification_, largest(k) * std::abs(mechanism_.rho()(p)) / largest_of_y);
+  }
   return true;
 }
 

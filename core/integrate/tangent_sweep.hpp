@@ -38,6 +38,8 @@ class TangentSweep {
   void finish(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, std::span<const Cost> costs,
               Eigen::MatrixXd& psi_rho);
 
+  // The largest change of the state by a change of a parameter, both relative, over all steps.
+  double magnification() const { return magnification_; }
   long linearised_states() const {
     return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0) +
            (rosenbrock_ ? rosenbrock_->linearised_states() : 0);
@@ -95,6 +97,7 @@ class TangentSweep {
   Eigen::MatrixXd y_rho_;
   GradientQuadrature* watch_;
   LaneRows r_, a_, s_, zero_;
+  double magnification_ = 0;
 };
 
 }  // namespace mbsopt

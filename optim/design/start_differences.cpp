@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "optim/differences/difference_comparison.hpp"
+#include "optim/objective/gradient_doubts.hpp"
 #include "optim/objective/integration_error.hpp"
 
 namespace mbsopt {
@@ -51,9 +52,10 @@ std::vector<std::string> difference_warnings(const CaseEvaluation& start, CaseEv
                                              const std::function<bool()>& go_on) {
   std::vector<std::vector<std::string>> of_cases(evaluator.cases());
   evaluator.for_each_case([&](std::size_t c) {
+    of_cases[c] = gradient_doubts(evaluator.of_case(c), start.of_cases[c]);
     DifferenceComparison comparison = comparison_at(start.of_cases[c], evaluator.of_case(c));
     comparison.go_on = go_on;
-    of_cases[c] = comparison.warnings();
+    for (std::string& warning : comparison.warnings()) of_cases[c].push_back(std::move(warning));
   });
   std::vector<std::string> warnings;
   for (std::size_t c = 0; c < of_cases.size(); ++c)

@@ -1,0 +1,53 @@
+#include "optim/objective/gradient_doubts.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "optim/check/gradient_check.hpp"
+#include "tests/optim/stopped_body.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+
+namespace {
+
+std::vector<std::string> doubts(const Problem& problem, GradientMethod method, double* slope = nullptr) {
+  Evaluator evaluator(problem.scene, objectives_of(problem), {}, {method});
+  const Evaluation& e = evaluator.gradients(evaluator.start());
+  INFO(e.message);
+  REQUIRE(e.ok);
+  if (slope) *slope = e.psi_rho(0, 0);
+  return gradient_doubts(evaluator, e);
+}
+
+}  // namespace
+
+TEST_CASE("a gradient through a stop that the steps do not know is said to be wrong, by every method", "[gradient]") {
+  const GradientMethod method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint, GradientMethod::cvodes_forward);
+  double slope = 0;
+  const std::vector<std::string> said = doubts(mbsopt::testing::stopped_body(), method, &slope);
+  INFO("d end/d h = " << slope);
+  REQUIRE(std::abs(slope - 1) > 1e-3);
+  REQUIRE(said.size() == 1);
+  CHECK_THAT(said[0], Contains("the gradient of objective 'end' is wrong") && Contains("force 'stop' has a kink"));
+}
+
+TEST_CASE("a gradient through a rounded stop, or along a stop that is not met, is not doubted", "[gradient]") {
+  const char* const force = GENERATE("-2500*(x + smooth_abs(x, 0.05))", "-5000*max(0, x - 2)", "-5000*max(0, x)^4");
+  double slope = 0;
+  const std::vector<std::string> said = doubts(mbsopt::testing::stopped_body(force), GradientMethod::tlm, &slope);
+  INFO(force << ", d end/d h = " << slope);
+  for (const std::string& w : said) UNSCOPED_INFO(w);
+  CHECK(said.empty());
+}
+
+TEST_CASE("the check does not pass a gradient that differences of free runs contradict", "[check]") {
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(mbsopt::testing::stopped_body(), options);
+  REQUIRE(check.ran);
+  const CheckedEntry& e = check.entries[0];
+  INFO(e.tlm << ", differences " << e.free << " +- " << e.free_error);
+  CHECK(e.free == Approx(1).epsilon(1e-4));
+  CHECK_FALSE(passes(*e.free_verdict));
+  CHECK_FALSE(check.passed());
+}
