@@ -72,10 +72,12 @@ GradientDifferences::Ladder GradientDifferences::ladder(Index k, bool frozen, do
     if (e.steps.sizes != base_.steps.sizes) ladder.other_steps = std::min(ladder.other_steps, std::abs(h));
     note(k, h, frozen, e.psi);
     const double near = largest * std::pow(0.5, settings_.rungs - kJumpRungs);
-    if (!frozen && std::abs(h) < 1.5 * near) {
-      const VectorXd& on_base_steps = rungs_.at({k, std::abs(h)})[0][h > 0 ? 0 : 1];
-      if (on_base_steps.size() > 0 && e.psi.allFinite() && on_base_steps.allFinite())
-        jump_.col(k) = jump_.col(k).cwiseMax((e.psi - on_base_steps).cwiseAbs());
+    if (!frozen && h < 0 && std::abs(h) < 1.5 * near) {
+      const auto& [on_base, on_free] = rungs_.at({k, std::abs(h)});
+      if (on_base[0].size() > 0 && on_base[1].size() > 0 && on_free[0].size() > 0) {
+        const VectorXd jump = (0.5 * (on_free[0] - on_base[0] + on_free[1] - on_base[1])).cwiseAbs();
+        if (jump.allFinite()) jump_.col(k) = jump_.col(k).cwiseMax(jump);
+      }
     }
     return std::move(e.psi);
   };
@@ -108,8 +110,9 @@ double GradientDifferences::own_error(const Ladder& ladder, Index i, Index k, bo
 
 // Free differences differ from the derivatives on frozen steps by the derivative of the integration error. They also
 // contain its jumps from step sequence to step sequence, divided by the step. The smallest steps show the size of the
-// jumps if both differences exist. If all runs of an entry took the steps of the base run, the entry is as good as one
-// on frozen steps. Rounded steps often coincide so (step_control.hpp).
+// jumps if both differences exist: the mean of what separates them at h and -h, since the part that is linear in h is a
+// difference of slopes, and excuses nothing. If all runs of an entry took the steps of the base run, the entry is as
+// good as one on frozen steps. Rounded steps often coincide so (step_control.hpp).
 void GradientDifferences::add(IntegrationError integration) {
   integration_ = std::move(integration);
   if (!settings_.free_steps) return;

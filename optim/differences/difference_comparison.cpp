@@ -20,7 +20,6 @@ constexpr double kMatters = 1e-3;  // of the group's largest derivative
 constexpr double kTrust = 10;      // times an estimated error
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using ComparedGroup = DifferenceComparison::Group;
 
@@ -39,22 +38,18 @@ class Comparison {
   std::vector<std::string> sentences(std::size_t variable);
 
  private:
-  struct Errors {
-    VectorXd f;
-    MatrixXd f_rho;
-  };
   // Returns nullopt if f cannot be evaluated beside the start.
   std::optional<Difference> difference(std::size_t variable) const;
   std::optional<Difference> difference(std::size_t variable, double wanted) const;
   // Returns the groups whose derivatives disagree with it, with a shorter one, and by more than the integrator's error.
   std::vector<const ComparedGroup*> disagreeing(std::size_t variable, const Difference& d);
   double largest_derivative(const ComparedGroup& group) const;
-  bool disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d, const Errors* integrator) const;
-  const Errors& integrator_errors();
+  bool disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d, const VectorXd* errors) const;
+  const VectorXd& integrator_errors();
 
   const DifferenceComparison& of_;
   std::once_flag asked_;
-  Errors errors_;
+  VectorXd errors_;  // of f
 };
 
 std::optional<Difference> Comparison::difference(std::size_t variable) const {
@@ -93,22 +88,21 @@ double Comparison::largest_derivative(const ComparedGroup& group) const {
 }
 
 bool Comparison::disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d,
-                           const Errors* integrator) const {
+                           const VectorXd* errors) const {
   const auto size = [&](const auto& x) { return rows(x, group).norm(); };
   const Index k = static_cast<Index>(variable);
   double allowed = std::max({kApart * size(of_.f_rho.col(k)), kApart * size(d.slope), size(d.bend),
                              kMatters * largest_derivative(group) / of_.variables[variable].size});
-  if (integrator) allowed += kTrust * (size(integrator->f) / d.h + size(integrator->f_rho.col(k)));
+  if (errors) allowed += kTrust * size(*errors) / d.h;
   return size(VectorXd(d.slope - of_.f_rho.col(k))) > allowed;
 }
 
-const Comparison::Errors& Comparison::integrator_errors() {
+const VectorXd& Comparison::integrator_errors() {
   std::call_once(asked_, [&] {
-    errors_ = {VectorXd::Zero(of_.f.size()), MatrixXd::Zero(of_.f_rho.rows(), of_.f_rho.cols())};
+    errors_.setZero(of_.f.size());
     VectorXd f;
-    MatrixXd f_rho;
-    if (of_.tighter && of_.tighter(f, f_rho) && f.size() == of_.f.size())
-      errors_ = {(f - of_.f).cwiseAbs(), (f_rho - of_.f_rho).cwiseAbs()};
+    Eigen::MatrixXd f_rho;
+    if (of_.tighter && of_.tighter(f, f_rho) && f.size() == of_.f.size()) errors_ = (f - of_.f).cwiseAbs();
   });
   return errors_;
 }

@@ -6,7 +6,7 @@
 //   |s - f_rho| <= max(1e-2 of either, |f(h) - 2 f(0) + f(-h)|/(2 h), 1e-3 of the group's largest derivative)
 //
 // Each variable is multiplied by its size, and a group has the 2-norm. If the test fails, it is repeated at h/16, and
-// then within ten times the integrator's error. Only then it warns.
+// then within ten times the integrator's error of f in s. Only then it warns.
 #pragma once
 
 #include <Eigen/Core>
