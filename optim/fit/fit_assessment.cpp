@@ -30,6 +30,17 @@ CovarianceType covariance_for(const FitContext& fit, const ExperimentStack& stac
   return CovarianceType::white;
 }
 
+// value -+ half; of a parameter that is fitted by its logarithm value exp(-+ half/value). Nothing lies beyond the
+// bounds, so that an interval at a bound has one side.
+void set_interval(FittedParameter& f, double half, bool logarithmic) {
+  for (const int side : {0, 1}) {
+    const double change = side == 0 ? -half : half;
+    double& end = f.ci95[side] = logarithmic ? f.value * std::exp(change / f.value) : f.value + change;
+    if (f.lower && end < *f.lower) end = *f.lower;
+    if (f.upper && end > *f.upper) end = *f.upper;
+  }
+}
+
 }  // namespace
 
 void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated) {
@@ -89,7 +100,7 @@ std::vector<FittedParameter> described(const FitContext& fit, const std::vector<
     f.at_lower = touches(p.lower), f.at_upper = touches(p.upper);
     if (statistics.std_error.size() > k) {
       f.std_error = statistics.std_error(k);
-      f.ci95[0] = statistics.ci95(k, 0), f.ci95[1] = statistics.ci95(k, 1);
+      set_interval(f, statistics.ci95(k, 1) - values(k), p.scale == ParameterScale::log);
     }
     fitted.push_back(std::move(f));
   }
