@@ -370,7 +370,12 @@ int identify_command(const CommandContext& context) {
   }
   std::optional<OtherModel> other;
   if (!context.options.compare.empty()) other.emplace(context.options.compare, read_options(context));
-  const std::vector<CsvTable> whole = data_of(run.problem);
+  std::vector<std::string> moved;
+  const std::vector<CsvTable> whole = data_of(run.problem, &moved);
+  for (const std::string& words : moved) {
+    run.result["columns"].push_back(words);
+    if (!context.options.quiet) context.err << words << '\n';
+  }
   // The scene includes its drives and overrides; without them it may not assemble.
   const Scene first = simulated_scene(run.problem, whole);
   const Mechanism mechanism(first, parameter_values(first));
@@ -392,9 +397,8 @@ int identify_command(const CommandContext& context) {
   if (!context.options.profiles.empty())  // before anything is fitted
     profiled_unknowns(context.options.profiles,
                       names_of(unknowns_of_fit(needed.scene, *needed.identification), *needed.identification));
-  const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
-  const bool cut_again = starts && !context.options.preflight;  // for the values of the best start, with its warnings
-  for (std::size_t i = 0; !cut_again && i < cut.warnings.size(); ++i) run.warn(cut.warnings[i]);
+  if (context.options.preflight)  // a fit cuts again, for the values of the best start, and warns then
+    for (const std::string& warning : cut.warnings) run.warn(warning);
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   const FitComparisonOptions compared{{}, [](double) { return !interrupted(); }, case_threads(run)};
@@ -405,10 +409,10 @@ int identify_command(const CommandContext& context) {
   if (context.options.preflight) return preflight(run, start);
   LongRun long_run(run);
   const BestStart best = from_best_start(run, long_run, whole);
-  if (interrupted() && starts) return stopped_within_starts(run, long_run, best.problem);
+  if (interrupted() && run.problem.identification->multistart)
+    return stopped_within_starts(run, long_run, best.problem);
   long_run.begin();
-  IdentificationResult fit = cut_again ? fitted(run, long_run, best.problem, whole, cut.problem)
-                                       : fitted(run, long_run, cut.problem, data, cut.problem);
+  IdentificationResult fit = fitted(run, long_run, best.problem, whole, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
   set_units(fit, cut.problem, data);
   add_to_result(run.result, fit);

@@ -6,6 +6,7 @@
 #include "app/results/optimized_problem.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
+#include "optim/fit/nearest_turn.hpp"
 #include "optim/fit/sigma_estimation.hpp"
 #include "optim/problem/logged_columns.hpp"
 #include "optim/problem/start_points.hpp"
@@ -36,6 +37,7 @@ double objective_of(const IdentificationSpec& spec, const IdentificationResult& 
 Json record_of_start(const Problem& problem, const std::vector<CsvTable>& data, int start) {
   IdentificationOptions options;
   options.simulation_progress = [](double) { return !interrupted(); };
+  options.tests_angles = false;
   options.progress = [](const FitRow&) { return !interrupted(); };
   const IdentificationResult fit = run_identification(problem, data, options);
   const double objective = objective_of(*problem.identification, fit);
@@ -86,9 +88,11 @@ StartWork start_work(const Problem& problem, const std::vector<CsvTable>& data, 
 
 }  // namespace
 
-std::vector<CsvTable> data_of(const Problem& problem) {
+std::vector<CsvTable> data_of(const Problem& problem, std::vector<std::string>* moved) {
   std::vector<CsvTable> data;
   for (const ExperimentSpec& experiment : problem.identification->experiments) data.push_back(read_record(experiment));
+  const std::vector<std::string> words = move_to_nearest_turn(problem, data);
+  if (moved) *moved = words;
   return data;
 }
 

@@ -23,8 +23,8 @@ BestStart from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTabl
 // The starts, from the task of this process or another one.
 StartWork identify_start_work(const Problem& problem, const Json& task);
 
-// The records of the experiments, in their order.
-std::vector<CsvTable> data_of(const Problem& problem);
+// The records of the experiments, in their order, on the turn nearest to the model. moved receives what was moved.
+std::vector<CsvTable> data_of(const Problem& problem, std::vector<std::string>* moved = nullptr);
 
 // Ends a run that was interrupted before the final fit began. best is that of from_best_start(). Returns the exit code.
 int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best);

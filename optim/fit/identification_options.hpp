@@ -20,6 +20,7 @@ struct IdentificationOptions {
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
   // No step is taken: residuals at the start, and the standard errors that the given sigmas predict there.
   bool preflight = false;
+  bool tests_angles = true;            // fits again where a column may be in degrees
   int threads = 1;                     // experiments at a time; results do not depend on it
   ResidualRecords* records = nullptr;  // of an earlier run that this one goes on with; of the fit and its profiles
   // After every point of a profile; false ends it there.
