@@ -35,10 +35,6 @@ void measure(RecordedChannel& column) {
 
 }  // namespace
 
-std::string record_name(const ExperimentSpec& experiment) {
-  return experiment.origin ? experiment.origin->experiment : experiment.name;
-}
-
 std::string unit_of_channel(const Scene& scene, const ChannelSpec& channel, const CsvTable& data) {
   const std::string stated = stated_unit(channel, data);
   if (const auto unit = stated.empty() ? std::nullopt : parse_column_unit(stated))

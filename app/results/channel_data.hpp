@@ -30,9 +30,6 @@ void add_residuals(std::vector<ChannelData>& channels, const IdentificationResul
 std::string channel_table(const std::vector<ChannelData>& channels);
 Json to_json(const std::vector<ChannelData>& channels);
 
-// The experiment of the file that an experiment, or a window, belongs to.
-std::string record_name(const ExperimentSpec& experiment);
-
 // The SI unit of a column; kUnknownUnit if neither the file nor the sensor tells.
 std::string unit_of_channel(const Scene& scene, const ChannelSpec& channel, const CsvTable& data);
 

@@ -2,10 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "optim/solver/equality_multipliers.hpp"
 
 namespace mbsopt {
 namespace {
+
+constexpr double kGuess = 1e-4;  // tolerance of a search that only gives a start to the next one
 
 // Tukey's loss has no pull far out, so that a start there would find nothing: Huber's estimate comes first.
 template <class Estimate>
@@ -18,8 +22,9 @@ LeastSquaresResult estimates_of(const Loss& loss, const Eigen::VectorXd& start, 
 
 }  // namespace
 
-LeastSquaresResult FitSearch::minimised(const Eigen::VectorXd& x) {
+LeastSquaresResult FitSearch::minimised(const Eigen::VectorXd& x, double loosest) {
   LeastSquaresOptions solver = solver_options(fit_);
+  solver.tolerance = std::max(solver.tolerance, loosest);
   const Eigen::VectorXd sigma = stack_.sigma();
   const int before = fit_.result.iterations;
   solver.progress = [&](const LeastSquaresProgress& p) {
@@ -43,7 +48,28 @@ LeastSquaresResult FitSearch::estimate(const Loss& loss, const Eigen::VectorXd& 
   stack_.loss = loss;
   if (!estimates_sigma(fit_.spec)) return minimised(x);
   SigmaEstimation sigmas(stack_, fit_.spec);
-  return loss.type == LossType::squared ? without_sigmas(sigmas, x) : in_turn_with_sigmas(sigmas, x);
+  return loss.type == LossType::squared ? best_without_sigmas(sigmas, x) : in_turn_with_sigmas(sigmas, x);
+}
+
+// The better one of two optima of the likelihood (sigma_estimation.hpp). A search that ends elsewhere leaves no
+// history.
+LeastSquaresResult FitSearch::best_without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x) {
+  const std::vector<double> given = sigmas.sigmas(), noise = sigmas.noise();
+  LeastSquaresResult free = without_sigmas(sigmas, x);
+  if (!fit_.sigmas_are_estimated || fit_.options.preflight) return free;
+  const std::vector<double> found = sigmas.sigmas();
+  if (std::ranges::equal(found, noise, [](double s, double least) { return s <= kNoisy * least; })) return free;
+  const double likelihood = sigmas.likelihood(free.point.z);
+  const std::size_t rows = fit_.result.history.size();
+  std::vector<double> first = noise;
+  for (std::size_t g = 0; g < first.size(); ++g)
+    if (sigmas.is_given(g)) first[g] = given[g];
+  sigmas.set(first);
+  LeastSquaresResult released = without_sigmas(sigmas, minimised(x, kGuess).x);
+  if (fit_.sigmas_are_estimated && sigmas.likelihood(released.point.z) < likelihood) return released;
+  fit_.result.history.resize(rows), apart_.resize(rows);
+  sigmas.set(found), fit_.sigmas_are_estimated = true;
+  return free;
 }
 
 LeastSquaresResult FitSearch::without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x) {

@@ -28,8 +28,9 @@ class FitSearch {
  private:
   LeastSquaresResult estimate(const Loss& loss, const Eigen::VectorXd& x);
   LeastSquaresResult without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
+  LeastSquaresResult best_without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
   LeastSquaresResult in_turn_with_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
-  LeastSquaresResult minimised(const Eigen::VectorXd& x);
+  LeastSquaresResult minimised(const Eigen::VectorXd& x, double loosest = 0);  // tolerance: at least it
   double take(SigmaEstimation& sigmas, LeastSquaresResult& solution) const;
   bool cost_changes() const;
   Eigen::VectorXd by_sigmas(Eigen::VectorXd apart) const;

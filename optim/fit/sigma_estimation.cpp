@@ -15,6 +15,10 @@ constexpr double kLeast = 1e-12;          // of the largest measured value: an e
 
 }  // namespace
 
+bool has_sigma(const ChannelSpec& channel) {
+  return !channel.sigma.is_number() || channel.sigma.number() != ChannelSpec().sigma.number();
+}
+
 bool estimates_sigma(const IdentificationSpec& spec) {
   return std::any_of(spec.experiments.begin(), spec.experiments.end(), [](const ExperimentSpec& e) {
     return !e.validate && std::any_of(e.channels.begin(), e.channels.end(),
@@ -22,20 +26,28 @@ bool estimates_sigma(const IdentificationSpec& spec) {
   });
 }
 
+double differenced_noise(const Eigen::VectorXd& m) {
+  const Eigen::Index n = m.size() - 2;
+  if (n < 1) return 0;
+  const Eigen::VectorXd sizes = (m.head(n) - 2 * m.segment(1, n) + m.tail(n)).cwiseAbs();
+  return kNormalMedian * median({sizes.begin(), sizes.end()}) / std::sqrt(6.0);
+}
+
 SigmaEstimation::SigmaEstimation(ExperimentStack& stack, const IdentificationSpec& spec) : stack_(stack) {
-  std::map<std::string, std::size_t> shared;  // group of a column
+  std::map<std::pair<std::string, std::string>, std::size_t> group_at;  // of a record, "" where shared, and a column
   Eigen::Index row = 0;
   for (std::size_t m = 0; m < stack.members().size(); ++m) {
     const ExperimentStack::Member& member = stack.members()[m];
     const std::vector<ChannelSpec>& channels = spec.experiments[member.experiment].channels;
     std::vector<std::size_t> group_of(channels.size(), 0);
     for (std::size_t c = 0; c < channels.size(); ++c) {
-      group_of[c] = groups_.size();
       if (channels[c].estimate_sigma == SigmaEstimate::none) continue;
-      if (channels[c].estimate_sigma == SigmaEstimate::shared)
-        group_of[c] = shared.try_emplace(channels[c].column, groups_.size()).first->second;
+      const bool own = channels[c].estimate_sigma == SigmaEstimate::own;
+      const std::string record = own ? record_name(spec.experiments[member.experiment]) : "";
+      group_of[c] = group_at.try_emplace({record, channels[c].column}, groups_.size()).first->second;
       if (group_of[c] == groups_.size()) groups_.emplace_back();
       groups_[group_of[c]].channels.emplace_back(m, c);
+      groups_[group_of[c]].is_given = has_sigma(channels[c]);
     }
     for (const Experiment::Sample& sample : member.model.samples()) {
       if (channels[sample.channel].estimate_sigma != SigmaEstimate::none) {
@@ -63,6 +75,30 @@ double SigmaEstimation::freedom() const {
 
 void SigmaEstimation::set(const Group& group, double sigma) {
   for (const auto& [member, channel] : group.channels) stack_.members()[member].model.set_sigma(channel, sigma);
+}
+
+std::vector<double> SigmaEstimation::sigmas() const {
+  std::vector<double> all;
+  for (const Group& group : groups_) all.push_back(sigma(group));
+  return all;
+}
+
+void SigmaEstimation::set(const std::vector<double>& sigmas) {
+  for (std::size_t g = 0; g < groups_.size(); ++g) set(groups_[g], sigmas[g]);
+}
+
+std::vector<double> SigmaEstimation::noise() const {
+  std::vector<double> all;
+  const Eigen::VectorXd measured = stack_.measured();
+  for (const Group& group : groups_) {
+    const double noise = differenced_noise(measured(group.rows));
+    all.push_back(noise > least(group) ? noise : sigma(group));
+  }
+  return all;
+}
+
+double SigmaEstimation::likelihood(const Eigen::VectorXd& z) const {
+  return stack_.cost(z) + freedom() * stack_.sigma().array().log().sum();
 }
 
 std::vector<ScaleGroup> SigmaEstimation::scale_groups() const {

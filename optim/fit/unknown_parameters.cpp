@@ -28,6 +28,10 @@ std::string place_of(const IdentificationSpec& spec, std::size_t experiment) {
   return place.empty() ? fmt::format("identification.experiments[{}]", experiment) : place;
 }
 
+const std::string& record_name(const ExperimentSpec& experiment) {
+  return experiment.origin ? experiment.origin->experiment : experiment.name;
+}
+
 bool is_held(const Parameter& p) {
   constexpr double kSame = 1e-12;  // of the bounds: nearer ones may be equal in the scaled variables of the solver
   return p.lower && p.upper && *p.upper - *p.lower <= kSame * std::max(std::abs(*p.lower), std::abs(*p.upper));

@@ -24,6 +24,9 @@ struct UnknownParameter {
 
 std::string place_of(const IdentificationSpec& spec, std::size_t experiment);  // its path in the problem file
 
+// The experiment of the file that an experiment, or a window, belongs to.
+const std::string& record_name(const ExperimentSpec& experiment);
+
 // A parameter whose bounds leave it nowhere to go is a constant, not an unknown.
 bool is_held(const Parameter& parameter);
 // Throws std::invalid_argument with the place where nothing is to be fitted, or something that no experiment sees.
