@@ -57,6 +57,7 @@ bool settle_accuracy(Run& run, const Scene& simulated, const std::vector<Objecti
   const SimulationSettings& given = run.problem.scene.simulation;
   if (!given.accuracy) return true;
   AccuracyOptions options;
+  if (run.context.command == "identify") options.without_objectives = QuantityKind::sensors;
   std::string doing;
   options.progress = [&](int simulations) {
     doing = fmt::format("choosing an integrator: simulation {}", simulations);

@@ -12,7 +12,6 @@
 #include "core/expression/counted.hpp"
 #include "core/scene/vocabulary.hpp"
 #include "core/watch/stiffness.hpp"
-#include "optim/tradeoff/tradeoff_errors.hpp"
 #include "optim/tradeoff/tradeoff_reference.hpp"
 
 namespace mbsopt {
@@ -238,9 +237,13 @@ class Chooser {
     constexpr double kKnown = 10;
     const TradeoffErrors errors(runs_, right, point.answer, kKnown);
     const std::vector<Quantity>& all = errors.quantities();
-    const bool objectives = std::any_of(all.begin(), all.end(), [](const Quantity& q) { return is_objective(q); });
+    const auto has = [&](QuantityKind kind) { return std::ranges::find(all, kind, &Quantity::kind) != all.end(); };
+    const bool objectives = has(QuantityKind::objective);
+    const QuantityKind judged = objectives                         ? QuantityKind::objective
+                                : has(options_.without_objectives) ? options_.without_objectives
+                                                                   : QuantityKind::motion;
     for (const Quantity& q : all) {
-      if (objectives ? !is_objective(q) : q.kind != QuantityKind::motion) continue;
+      if (q.kind != judged) continue;
       const std::string name = objectives ? runs_.objectives()[static_cast<std::size_t>(q.objective)].name() : q.name;
       point.estimates.push_back({name, q.relative, std::max(q.certificate, AccuracyChoice::kRounding)});
     }
@@ -248,7 +251,6 @@ class Chooser {
     for (std::size_t i = 0; i < point.estimates.size(); ++i)
       point.errors(static_cast<Index>(i)) = point.estimates[i].error;
   }
-  static bool is_objective(const Quantity& q) { return q.kind == QuantityKind::objective; }
 
   void conclude(const Point& point) {
     result_.ok = true;

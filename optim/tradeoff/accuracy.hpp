@@ -1,7 +1,8 @@
 // Integrator and tolerances for a wanted accuracy (simulation.accuracy), found by runs of the scene, with their
 // expected error.
 //
-//   wanted   relative error of the objectives; of the motion if none is simulated (tradeoff_errors.hpp)
+//   wanted   relative error of the objectives; of the motion if none is simulated (tradeoff_errors.hpp); of the sensors
+//            for a fit, which sees the motion by them alone
 //   method   explicit, unless stability and not accuracy limits its steps (core/watch/stiffness.hpp): then implicit
 //   rtol     from error ~ C rtol^p, fitted to the runs so far, until the estimate is within the wanted error
 //   error    the difference from a run with a tolerance 100 times smaller, by dopri853 if the method is explicit:
@@ -18,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "optim/tradeoff/tradeoff_runs.hpp"
+#include "optim/tradeoff/tradeoff_errors.hpp"
 
 namespace mbsopt {
 
@@ -54,6 +55,7 @@ struct AccuracyChoice {
 
 struct AccuracyOptions {
   RunLimit limit = {};
+  QuantityKind without_objectives = QuantityKind::motion;  // or sensors, where there are some
   std::function<void(int simulations)> progress = {};
 };
 
