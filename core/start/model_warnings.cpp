@@ -28,7 +28,7 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double kMassless = 1e-12;           // of an inertia about a principal axis, relative to the body's trace
-constexpr double kZeroLength = 1e-9;          // [m]
+constexpr double kZeroLength = 1e-9;          // of the mechanism's length
 constexpr double kMuchViolated = 0.1;         // of the mechanism's size for points, rad for axes
 constexpr double kModelRankThreshold = 1e-8;  // rows of J scaled to unit length
 
@@ -91,9 +91,10 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
 }
 
 void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
+  const double zero = kZeroLength * joint_lengths(d).whole;
   for (const TsdaForce& f : d.forces->of<TsdaForce>()) {
     const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
-    if (l > kZeroLength) continue;
+    if (l > zero) continue;
     warnings.push_back(fmt::format(
         "a tsda between '{}' and '{}' has zero length at the start, where it has no direction; its force acts "
         "once its points have moved apart",
@@ -181,12 +182,13 @@ void add_reactions(const Mechanism& mechanism, const AssemblyResult& start, std:
 
 // Returns whether the ground holds the centre of mass of every body, so that gravity moves nothing.
 bool is_balanced(const MechanismData& d) {
+  const double zero = kZeroLength * joint_lengths(d).whole;
   std::vector<bool> held(at(d.n) + 1, false);
   held[0] = true;
   for (const Constraint& c : d.constraints) {
     const auto* p = std::get_if<Coincidence>(&c.primitive);
-    if (p && c.body1 == 0 && p->s2.norm() <= kZeroLength) held[at(c.body2)] = true;
-    if (p && c.body2 == 0 && p->s1.norm() <= kZeroLength) held[at(c.body1)] = true;
+    if (p && c.body1 == 0 && p->s2.norm() <= zero) held[at(c.body2)] = true;
+    if (p && c.body2 == 0 && p->s1.norm() <= zero) held[at(c.body1)] = true;
   }
   return std::all_of(held.begin(), held.end(), [](bool h) { return h; });
 }
