@@ -370,6 +370,70 @@ def depends_on_time(problem):
     return "t" in names_in(laws) or any(isinstance(drive["law"], dict) for drive in problem.get("drives", []))
 
 
+def brief(lab):
+    """Blows on bodies and fast steps of drives, that the steps of the scene as it is might pass over, against a run by
+    steps of a 20 000th of the time. A driven scene is integrated for this, with its true extremes left out."""
+    text = str(lab.problem.get("forces", [])) + str(lab.problem.get("drives", []))
+    if not any(mark in text for mark in ("abs(t", "exp(-((t", "tanh((t", "blow")):
+        return []
+    base = lab.run("simulate")
+    fine = lab.run("simulate", finer(lab, 500) | {"simulation.solve": "dynamics"}, patience=5)
+    if not base.ok or not fine.ok:
+        return []
+    worst, where = lab.apart(fine.trajectory(), base.trajectory())
+    for name, objective in lab.problem["objectives"].items():
+        if {"maximum_of", "minimum_of"} & set(objective):
+            continue
+        size = abs(fine.value(name)) + natural_size(lab, name)
+        if not abs(fine.value(name) - base.value(name)) / size <= max(worst, 1e-4):
+            worst, where = abs(fine.value(name) - base.value(name)) / size, f"{name} {fine.value(name)!r} and {base.value(name)!r}"
+    if worst > 1e-4 and certain(lab, worst) and not lab.doubts(base, fine):
+        return [("brief", f"steps of a 20 000th and the scene's own, {where}: {worst:.1e} apart")]
+    return []
+
+
+def loose_bounds(lab):
+    """A design within bounds far beyond its start is no worse than this start."""
+    if not lab.problem.get("parameters"):
+        return []
+    problem = copy.deepcopy(lab.problem)
+    rng = random.Random(lab.problem["name"])
+    name, reach = rng.choice(sorted(problem["parameters"])), 10 ** rng.uniform(3, 10)
+    value, size = problem["parameters"][name]["value"], lab.parameter_sizes()[name]
+    problem["parameters"][name] |= {"lower": value - size * reach, "upper": value + size * reach}
+    problem["design"] = {"minimize": sorted(problem["objectives"])[0], "variables": [name],
+                         "optimizer": {"type": rng.choice(["ipopt", "slsqp", "mma", "lbfgs"]), "max_iterations": 5,
+                                       "max_evaluations": 15}}
+    lab.variant("loose", problem)
+    run = lab.run("design", file="loose", patience=3)
+    optimizer = run.result.get("optimizer", {}) if run.ok else {}
+    before, after = optimizer.get("objective_initial"), optimizer.get("objective_final")
+    if before is None or after is None or after <= before + 1e-9 * (abs(before) + natural_size(lab, problem["design"]["minimize"])):
+        return []
+    return [("loose bounds", f"{name} within {reach:.0e} times its size: {before!r} before, {after!r} after the design")]
+
+
+def interrupted(lab):
+    """A sweep that a signal ends and `resume` goes on with has the rows of one that nothing ends."""
+    parameters = lab.problem.get("parameters")
+    if not parameters:
+        return []
+    name = sorted(parameters)[0]
+    value, size = parameters[name]["value"], 0.01 * lab.parameter_sizes()[name]
+    points = ("--threads", "1", "--vary", f"{name}={value - size!r}:{value + size!r}:12")
+    whole = lab.run("sweep", arguments=points, patience=3)
+    if not whole.ok:
+        return []
+    cut = lab.run("sweep", {}, points + ("--keep-journal",), interrupt=random.Random(name).uniform(0.1, 0.9) * whole.seconds)
+    if not (cut.folder / "journal.jsonl").exists():
+        return []
+    lab.resume(cut)
+    rows = [(run.folder / "sweep.csv").read_text().splitlines() for run in (whole, cut)]
+    if rows[0] != rows[1]:
+        return [("interrupted", f"{sum(a != b for a, b in zip(*rows))} of {len(rows[0])} rows differ after resume")]
+    return []
+
+
 def own_check(lab):
     if not lab.problem.get("parameters") or len(lab.problem["parameters"]) * len(lab.problem["bodies"]) > 12:
         return []

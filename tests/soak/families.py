@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from rotations import random_direction, random_turn, times
 
 WEIGHTS = {"space": 4, "planar": 4, "nearly planar": 2, "rotated planar": 2, "far": 1, "tiny": 1, "huge": 1,
-           "mass ratios": 2, "spin": 1, "stiff": 1, "massless": 1, "rough": 1, "driven": 2, "equilibrium": 1}
+           "mass ratios": 2, "spin": 1, "stiff": 1, "massless": 1, "rough": 1, "driven": 2, "equilibrium": 1,
+           "pulse": 1, "swift": 1}
 
 
 @dataclass
@@ -44,6 +45,9 @@ def draw_family(rng):
         f.names.add(rng.choices(names, WEIGHTS.values())[0])
     if not f.names & {"space", "planar", "nearly planar", "rotated planar"}:
         f.names.add(rng.choice(["space", "planar"]))
+    if f.has("swift"):  # a fast step in a drive's law
+        f.names.add("driven")
+        f.names.discard("equilibrium")
     f.planar = bool(f.names & {"planar", "nearly planar", "rotated planar"})
     f.bodies = rng.choices(range(1, 13), [6, 6, 6, 5, 4, 3, 2, 1, 1, 1, 1, 1])[0]
     f.length = 1e-6 if f.has("tiny") else 1e4 if f.has("huge") else log_uniform(rng, 0.2, 2)

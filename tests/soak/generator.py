@@ -21,7 +21,8 @@ def random_scene(seed):
     loads = Loads(rng, mechanism, f"{seed}_{{}}.csv")
     measures = Measures(rng, mechanism, loads)
     problem = {"format": 1, "name": f"scene_{seed}", "gravity": gravity(rng, family), "bodies": mechanism.bodies,
-               "joints": mechanism.joint_fields, "drives": loads.drives, "forces": loads.forces,
+               "joints": mechanism.joint_fields, "drives": loads.drives, "signals": loads.signals,
+               "forces": loads.forces,
                "sensors": measures.sensors, "simulation": settings(rng, family), "objectives": measures.objectives}
     if family.has("equilibrium"):
         problem["initial"] = {"equilibrium": True}

@@ -10,7 +10,8 @@ from scene import Scene
 # Warnings of the program that say its motion may be off by more than usual.
 DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|"
                    r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|has no (mass|inertia)|"
-                   r"faster than|penalty|contradict|give way|not determined|could not be evaluated", re.IGNORECASE)
+                   r"faster than|penalty|contradict|give way|not determined|could not be evaluated|pulse|kink",
+                   re.IGNORECASE)
 # Of these, the ones that explain why two sweeps differentiate the same steps differently,
 SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict|do not resolve the gradient|"
                          r"derivatives leave out|give way", re.IGNORECASE)
@@ -43,13 +44,17 @@ class Lab:
     def variant(self, name, problem):
         self.write(name, Scene(problem, self.scene.files))
 
-    def run(self, command, settings=None, arguments=(), file="scene", patience=1.0):
+    def run(self, command, settings=None, arguments=(), file="scene", patience=1.0, interrupt=None):
         key = (command, str(settings), tuple(arguments), file)
         if key not in self.outcomes:
             folder = self.folder / f"{file}_{len(self.outcomes)}"
             self.outcomes[key] = self.program.run(command, self.files[file], folder, settings or {}, arguments,
-                                                  patience)
+                                                  patience, interrupt)
         return self.outcomes[key]
+
+    def resume(self, outcome):
+        """Goes on with an interrupted run, in its folder."""
+        return self.program.run("resume", outcome.folder, None)
 
     def tight(self, **others):
         """An integrator whose errors do not count."""

@@ -10,11 +10,13 @@ from rotations import add, norm, random_direction, rotate, sub, times, unrotate
 class Loads:
     def __init__(self, rng, mechanism, csv_name):
         self.rng, self.m, self.family, self.csv_name = rng, mechanism, mechanism.family, csv_name
-        self.drives, self.forces, self.sensors, self.files = [], [], {}, {}
+        self.drives, self.forces, self.sensors, self.files, self.signals = [], [], {}, {}, {}
         self.driven_joints = set()
         self.add_drives()
         for _ in range(rng.choices([0, 1, 2, 3, 4], [2, 3, 3, 2, 1])[0]):
             self.add_force()
+        if self.family.has("pulse"):
+            self.add_pulse()
         if self.family.has("equilibrium"):
             self.hold_everything()
 
@@ -87,9 +89,43 @@ class Loads:
                 Formula("{} + {}*t + {}*sin({}*t)^2", start, rate, reach, w),
                 Formula("{} + {}*tanh({}*t)", start, reach, w),
                 Formula("{}", start)])
+            if self.family.has("swift"):
+                instant, width = self.brief(-4)
+                step = Formula("{}*(1 + tanh((t - {})/{}))", 0.2 * reach, instant, width)
+                law = fields["law"]
+                fields["law"] = Formula(law.template + " + " + step.template, *law.values, *step.values)
         self.drives.append(fields)
 
+    def brief(self, least):
+        """An instant of the run, and a length of time that steps of the whole motion pass over."""
+        end = self.family.end_time
+        return end * self.rng.uniform(0.1, 0.9), end * 10 ** self.rng.uniform(least, -2.3)
+
     # ---- forces
+
+    def add_pulse(self):
+        """A blow on a body: a formula of time, or samples in a file."""
+        rng, f = self.rng, self.family
+        k = rng.randrange(1, len(self.m.poses))
+        impulse = self.least((k,), "mass") * f.length / f.time * rng.uniform(0.1, 1)
+        sampled = rng.random() < 0.5
+        start, width = self.brief(-3.2 if sampled else -4)
+        if sampled:
+            name, step = self.csv_name.format("blow"), width / 8
+            rows, count = ["t,F"], math.ceil(f.end_time / step) + 2
+            for i in range(count):
+                s = (i * step - start) / width
+                rows.append(f"{i * step!r},{impulse / width * math.sin(math.pi * s) if 0 < s < 1 else 0.0!r}")
+            self.files[name] = "\n".join(rows) + "\n"
+            self.signals["blow"] = {"file": name, "column": "F", "interpolation": rng.choice(["linear", "spline"])}
+            component = "blow"
+        else:
+            component = rng.choice([Formula("{}*max(0, 1 - abs(t - {})/{})", impulse / width, start, width),
+                                    Formula("{}*exp(-((t - {})/{})^2)", impulse / width, start, width)])
+        components = [component, 0, 0]
+        rng.shuffle(components)
+        self.forces.append({"name": f"f{len(self.forces) + 1}", "type": "force", "body": self.m.poses[k].name,
+                            "point": self.m.local_point(self.m.poses[k]), "components": components})
 
     def stiffness(self, inertia):
         rng, T = self.rng, self.family.time

@@ -21,6 +21,7 @@ class Outcome:
     def __init__(self, command, code, out, err, folder):
         self.command, self.code, self.out, self.err, self.folder = command, code, out, err, folder
         self.complaints = []  # (kind, words)
+        self.interrupted = False
         self.slow = []  # its words of progress, where it was stopped because it took long
         self.result = self.read_result()
 
@@ -68,7 +69,7 @@ class Outcome:
         if self.code < 0:
             self.complain("signal", f"died by signal {-self.code} ({signal.Signals(-self.code).name})")
             return
-        if self.code not in (0, 1, 2, 3):
+        if self.code not in (0, 1, 2, 3, *((130,) if self.interrupted else ())):
             self.complain("exit code", f"ended with {self.code}")
         if self.code == 0:
             self.look_at_numbers(self.result.get("objectives"), "objectives")
@@ -110,22 +111,27 @@ class Program:
     def __init__(self, path, patience=1.0):
         self.path, self.patience = str(path), patience
 
-    def run(self, command, file, folder, settings=(), arguments=(), patience=1.0):
-        line = [self.path, command, str(file), "--out", str(folder), *arguments]
+    def run(self, command, file, folder, settings=(), arguments=(), patience=1.0, interrupt=None):
+        """interrupt: after so many seconds the run gets a signal, as by Ctrl-C. Without a folder it resumes `file`."""
+        line = [self.path, command, str(file), *(("--out", str(folder)) if folder else ()), *arguments]
         for path, value in dict(settings).items():
             line += ["--set", f"{path}={value if isinstance(value, str) else json.dumps(value)}"]
-        folder = Path(folder)
+        folder = Path(folder or file)
         for left in ("result.json", "trajectory.csv"):
             (folder / left).unlink(missing_ok=True)
         patience *= self.patience
         start, told = time.monotonic(), command + "".join(" " + word for word in line[5:])
         process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL)
-        hung = False
+        hung, was_interrupted = False, interrupt is not None
         while True:
             try:
-                out, err = process.communicate(timeout=HANG)
+                out, err = process.communicate(timeout=interrupt or HANG)
                 break
             except subprocess.TimeoutExpired:
+                if interrupt:
+                    process.send_signal(signal.SIGINT)
+                    interrupt = None
+                    continue
                 waited = time.monotonic() - start
                 if processor_seconds(process.pid) < HANG * patience and waited < STUCK * patience:
                     continue
@@ -134,12 +140,14 @@ class Program:
                 hung = True
                 process.send_signal(signal.SIGTERM)
         outcome = Outcome(told, process.returncode, out.decode(errors="replace"), err.decode(errors="replace"), folder)
+        outcome.seconds = time.monotonic() - start
         if hung:
             outcome.code = 130
             outcome.slow = PROGRESS.findall(outcome.err)
             if not outcome.slow:
                 outcome.complain("hang", f"no end and no word within {HANG:g} s: {outcome.message[-200:]}")
         else:
+            outcome.interrupted = was_interrupted
             outcome.look()
         return outcome
 

@@ -31,4 +31,5 @@ def load(path):
     problem = json.loads("\n".join(line for line in lines if not line.lstrip().startswith("//")))
     laws = [drive.get("law") for drive in problem.get("drives", [])]
     names = [law["csv"] for law in laws if isinstance(law, dict)]
+    names += [signal["file"] for signal in problem.get("signals", {}).values()]
     return Scene(problem, {name: (path.parent / name).read_text() for name in names}, about)

@@ -24,7 +24,7 @@ def shrunk(scene, kind, kinds_of, patience=1.0):
                 break
             if time.monotonic() > end:
                 break
-    used = str(scene.problem.get("drives", []))
+    used = str(scene.problem.get("drives", [])) + str(scene.problem.get("signals", {}))
     scene.files = {name: text for name, text in scene.files.items() if name in used}
     return scene
 
