@@ -298,6 +298,36 @@ def tilt(lab):
     return compare_by_steps(lab, "tilt", ("adjoint", "scene", {}), ("adjoint", "tilted", {}), 1e-5, ERRORS, same)
 
 
+def rounded(lab):
+    """Redundant loops that are turned in space and written with a few digits, as CAD does, against all digits."""
+    base = watched(lab)
+    if not base.ok or not base.result["model"]["redundant"]:
+        return []
+    rng = random.Random(lab.problem["name"])
+    problem, digits = tilted(lab.problem, random_turn(rng)), rng.randint(6, 10)
+    if problem is None:
+        return []
+    lab.variant("tilted", problem)
+    lab.variant("rounded", problem | {"joints": rounded_numbers(problem["joints"], digits)})
+    runs = [lab.run("simulate", lab.tight(), file=file) for file in ("tilted", "rounded")]
+    if not runs[0].ok:
+        return []
+    if not runs[1].ok:
+        return [] if lab.doubts(runs[1]) else [("rounded", f"{digits} digits end with: {runs[1].message[-300:]}")]
+    worst, where = lab.apart(*(run.trajectory() for run in runs))
+    if worst > 1e3 * 10**-digits and certain(lab, worst) and not lab.doubts(*runs):
+        return [("rounded", f"{digits} digits and all of them, {where}: {worst:.1e} apart")]
+    return []
+
+
+def rounded_numbers(node, digits):
+    if isinstance(node, dict):
+        return {key: rounded_numbers(value, digits) for key, value in node.items()}
+    if isinstance(node, list):
+        return [rounded_numbers(value, digits) for value in node]
+    return float(f"{node:.{digits}g}") if isinstance(node, float) else node
+
+
 def turned_back(run, lab, turn, reference):
     back, result = inverse(turn), {"t": run["t"]}
     for body in (b["name"] for b in lab.problem["bodies"]):
@@ -386,7 +416,8 @@ def brief(lab):
             continue
         size = abs(fine.value(name)) + natural_size(lab, name)
         if not abs(fine.value(name) - base.value(name)) / size <= max(worst, 1e-4):
-            worst, where = abs(fine.value(name) - base.value(name)) / size, f"{name} {fine.value(name)!r} and {base.value(name)!r}"
+            worst = abs(fine.value(name) - base.value(name)) / size
+            where = f"{name} {fine.value(name)!r} and {base.value(name)!r}"
     if worst > 1e-4 and certain(lab, worst) and not lab.doubts(base, fine):
         return [("brief", f"steps of a 20 000th and the scene's own, {where}: {worst:.1e} apart")]
     return []
@@ -408,9 +439,11 @@ def loose_bounds(lab):
     run = lab.run("design", file="loose", patience=3)
     optimizer = run.result.get("optimizer", {}) if run.ok else {}
     before, after = optimizer.get("objective_initial"), optimizer.get("objective_final")
-    if before is None or after is None or after <= before + 1e-9 * (abs(before) + natural_size(lab, problem["design"]["minimize"])):
+    if before is None or after is None:
         return []
-    return [("loose bounds", f"{name} within {reach:.0e} times its size: {before!r} before, {after!r} after the design")]
+    if after <= before + 1e-9 * (abs(before) + natural_size(lab, problem["design"]["minimize"])):
+        return []
+    return [("loose bounds", f"{name} within {reach:.0e} times its size: {before!r} before, {after!r} after")]
 
 
 def interrupted(lab):
@@ -424,7 +457,8 @@ def interrupted(lab):
     whole = lab.run("sweep", arguments=points, patience=3)
     if not whole.ok:
         return []
-    cut = lab.run("sweep", {}, points + ("--keep-journal",), interrupt=random.Random(name).uniform(0.1, 0.9) * whole.seconds)
+    instant = random.Random(name).uniform(0.1, 0.9) * whole.seconds
+    cut = lab.run("sweep", {}, points + ("--keep-journal",), interrupt=instant)
     if not (cut.folder / "journal.jsonl").exists():
         return []
     lab.resume(cut)

@@ -7,7 +7,7 @@ from rotations import random_direction, random_turn, times
 
 WEIGHTS = {"space": 4, "planar": 4, "nearly planar": 2, "rotated planar": 2, "far": 1, "tiny": 1, "huge": 1,
            "mass ratios": 2, "spin": 1, "stiff": 1, "massless": 1, "rough": 1, "driven": 2, "equilibrium": 1,
-           "pulse": 1, "swift": 1}
+           "pulse": 1, "swift": 1, "micrometres": 1}
 
 
 @dataclass
@@ -16,6 +16,7 @@ class Family:
     bodies: int = 1
     length: float = 1.0  # [m]
     mass: float = 1.0  # [kg]
+    gravity: float = 9.81  # [m/s^2]
     time: float = 0.3  # [s], sqrt(length/g): how long a body of this size falls along itself
     end_time: float = 0.5
     planar: bool = False
@@ -54,7 +55,9 @@ def draw_family(rng):
     f.mass = log_uniform(rng, 0.1, 10)
     if f.has("tiny") and rng.random() < 0.5:
         f.mass *= 1e-15  # as dense as water
-    f.time = math.sqrt(f.length / 9.81)
+    if f.has("micrometres"):  # in um, ug and us instead of m, kg and s
+        f.length, f.mass, f.gravity = log_uniform(rng, 50, 500), log_uniform(rng, 1e2, 1e4), 9.81e-6
+    f.time = math.sqrt(f.length / f.gravity)
     f.end_time = f.time * rng.uniform(0.5, 3)
     f.normal = [0, 0, 0]
     f.normal[rng.randrange(3)] = 1

@@ -40,7 +40,7 @@ def gravity(rng, family):
     if rng.random() < 0.1:
         return [0, 0, 0]
     flat = family.planar and rng.random() < 0.85
-    return times(9.81, perpendicular(rng, family.normal) if flat else random_direction(rng))
+    return times(family.gravity, perpendicular(rng, family.normal) if flat else random_direction(rng))
 
 
 def settings(rng, family):

@@ -30,8 +30,9 @@ from shrink import shrunk
 ROOT = Path(__file__).resolve().parents[2]
 # Each check, and of how many scenes one is asked.
 CHECKS = [(checks.sweeps, 1), (checks.plane, 1), (checks.energy, 1), (checks.kinematics, 1), (checks.equilibrium, 1),
-          (checks.integrators, 2), (checks.differences, 2), (checks.tilt, 2), (checks.order, 4), (checks.again, 20),
-          (checks.brief, 1), (checks.loose_bounds, 20), (checks.interrupted, 25), (checks.own_check, 15), (checks.other_commands, 10), (oracle.agrees, 50)]
+          (checks.integrators, 2), (checks.differences, 2), (checks.tilt, 2), (checks.rounded, 2), (checks.order, 4),
+          (checks.again, 20), (checks.brief, 1), (checks.loose_bounds, 20), (checks.interrupted, 25),
+          (checks.own_check, 15), (checks.other_commands, 10), (oracle.agrees, 50)]
 
 
 def examine(scene, program, chosen, folder):
