@@ -11,6 +11,8 @@
 namespace mbsopt {
 namespace {
 
+constexpr double kShareOfLaw =
+    0.02;  // of E: a law is smooth but for its pulses, so more doubts than of records cost little
 constexpr std::size_t kFewest = 3;  // instants: fewer bound no pulse
 
 // The slope of the parabola through three samples, at the middle one; at ends that of the line.
@@ -108,7 +110,8 @@ void PulseWatch::look_at(Function& f, double t, double h, bool noticed) {
   }
   if (nodes_.size() == 1) null = 0;
   const double missed = std::abs(integral_to(f, t + h) - integral_to(f, t) - h * mean);
-  if (!(missed > (noticed ? h * std::abs(null) : f.largest))) return;
+  const double share = f.curve ? 1 : kShareOfLaw;
+  if (!(missed > (noticed ? share * h * std::abs(null) : f.largest))) return;
   const auto differs = [&](std::size_t i) {
     return std::abs(f.integral[i + 1] - f.integral[i] - mean * (f.t(i + 1) - f.t(i)));
   };

@@ -4,9 +4,10 @@
 // A function f of time has a known integral I over a step. The step takes Q = h sum_i b_i f(t + c_i h) instead.
 //   D = |I - Q|             what the step misses
 //   E = h |sum_i e_i f_i|   what its nodes notice, by the null rule (quadrature_watch.hpp)
-// If D > E, the step is in doubt. Let f differ most from Q/h at t*, and less than half as much at t'. The accelerations
-// a at both instants, in one state, say how much the velocities miss:  D (a(t*) - a(t'))/(f(t*) - f(t')).
-// So a rough record costs nothing where nodes notice it, and a pulse below the tolerances costs two evaluations.
+// If D > E, or 0.02 E of a law, the step is in doubt. Let f differ most from Q/h at t*, and less than half as much at
+// t'. The accelerations a at both instants, in one state, say how much the velocities miss:  D (a(t*) - a(t'))/(f(t*) -
+// f(t')). So a rough record costs nothing where nodes notice it, and a pulse below the tolerances costs two
+// evaluations.
 //
 //   PulseWatch watch(mechanism, start, end, pulse_nodes(method));
 //   for (const PulseWatch::Doubt& doubt : watch.doubts(t, h)) ...
