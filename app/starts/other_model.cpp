@@ -20,7 +20,7 @@ void OtherModel::check(const Scene& first, const IdentificationOptions& options)
   try {
     cut_ = cut_into_windows(problem_, data_of(problem_), options.user_forces, options.simulation_progress);
     IdentificationOptions once = options;
-    once.preflight = true;
+    once.preflight = true, once.tests_angles = false;
     run_identification(cut_.problem, cut_.data, once);
   } catch (const std::invalid_argument& error) {
     const Finding whole{source_->file.string(), 0, 0, "", error.what()};

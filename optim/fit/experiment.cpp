@@ -163,7 +163,7 @@ void Experiment::compile_channels(const ExperimentSpec& spec, const std::string&
                         "residual is small (\"estimate_sigma\": true estimates it from the residuals)",
                         at, scene_.parameters[static_cast<std::size_t>(unknown.parameter)].name));
     Program::Scratch scratch;
-    result.sigma = evaluated(sigma, rho_, settings_.start_time, scratch).value;
+    result.sigma = result.given_sigma = evaluated(sigma, rho_, settings_.start_time, scratch).value;
     if (!(result.sigma > 0 && std::isfinite(result.sigma)))
       throw std::invalid_argument(fmt::format("{}.sigma: is {}, must be above 0", at, result.sigma));
     channels_.push_back(std::move(result));

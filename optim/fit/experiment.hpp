@@ -84,6 +84,7 @@ class Experiment {
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   std::size_t channels() const { return channels_.size(); }
   double sigma(std::size_t channel) const { return channels_[channel].sigma; }
+  double given_sigma(std::size_t channel) const { return channels_[channel].given_sigma; }
   void set_sigma(std::size_t channel, double sigma) { channels_[channel].sigma = sigma; }
   std::size_t missing(std::size_t channel) const { return channels_[channel].missing; }
   double start_time() const { return settings_.start_time; }
@@ -93,7 +94,7 @@ class Experiment {
   struct Channel {
     int sensor = 0;
     Program gain, bias, delay;  // inputs: all parameters, then t
-    double sigma = 1;
+    double sigma = 1, given_sigma = 1;
     double first = 0;  // samples before are left out [s]
     std::size_t missing = 0;
   };

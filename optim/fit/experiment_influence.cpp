@@ -1,5 +1,6 @@
 #include "optim/fit/experiment_influence.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -53,10 +54,15 @@ VectorXd least(const Rows& rows, const VectorXd& lower, const VectorXd& upper) {
                                                          lower.cwiseQuotient(scale), upper.cwiseQuotient(scale)));
 }
 
-}  // namespace
+// The rows of each member in the shared variables once its own variables are eliminated, and those of their priors.
+struct SharedRows {
+  std::vector<Index> shared;
+  Rows priors;
+  std::vector<Rows> parts;
+};
 
-std::vector<VectorXd> changes_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
-                                      const std::vector<UnknownParameter>& unknowns) {
+SharedRows shared_rows(const ExperimentStack& stack, const LeastSquaresResult& solution,
+                       const std::vector<UnknownParameter>& unknowns) {
   const VectorXd &x = solution.x, &z = solution.point.z;
   const MatrixXd& z_x = solution.point.z_x;
   std::vector<Index> shared, number(unknowns.size(), -1);
@@ -93,7 +99,16 @@ std::vector<VectorXd> changes_without(const ExperimentStack& stack, const LeastS
     Rows& rest = parts.emplace_back(Rows{MatrixXd::Zero(left, n), R.bottomRows(left).rightCols(1)});
     rest.T(Eigen::all, here) = R.bottomRows(left).middleCols(own, columns - own);
   }
+  return {std::move(shared), std::move(priors), std::move(parts)};
+}
 
+}  // namespace
+
+std::vector<VectorXd> changes_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
+                                      const std::vector<UnknownParameter>& unknowns) {
+  const VectorXd& x = solution.x;
+  const auto [shared, priors, parts] = shared_rows(stack, solution, unknowns);
+  const Index n = static_cast<Index>(shared.size());
   // The rows of all parts from e on; those before e are gathered on the way.
   std::vector<Rows> from(parts.size() + 1, priors);
   for (std::size_t e = parts.size(); e-- > 0;) from[e] = together(from[e + 1], parts[e]);
@@ -106,6 +121,29 @@ std::vector<VectorXd> changes_without(const ExperimentStack& stack, const LeastS
     before = together(before, parts[e]);
   }
   return changes;
+}
+
+std::vector<OthersWithout> others_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
+                                          const std::vector<UnknownParameter>& unknowns,
+                                          const std::vector<std::size_t>& record_of_member) {
+  const SharedRows rows = shared_rows(stack, solution, unknowns);
+  const VectorXd pull = stack.weights(solution.point.z).cwiseSqrt().cwiseProduct(solution.point.z);
+  std::vector<OthersWithout> all(*std::ranges::max_element(record_of_member) + 1);
+  for (std::size_t record = 0; record < all.size(); ++record) {
+    Rows others = rows.priors;
+    Index first = 0;
+    for (std::size_t m = 0; m < record_of_member.size(); ++m) {
+      const Index n = static_cast<Index>(stack.members()[m].model.samples().size());
+      if (record_of_member[m] != record) {
+        others = together(others, rows.parts[m]);
+        all[record].samples += n, all[record].before += pull.segment(first, n).squaredNorm();
+      }
+      first += n;
+    }
+    const VectorXd left = others.p - others.T * OrthogonalDecomposition(others.T, kRankTolerance).solve(others.p);
+    all[record].after = std::max(all[record].before - others.p.squaredNorm() + left.squaredNorm(), 0.0);
+  }
+  return all;
 }
 
 }  // namespace mbsopt

@@ -21,4 +21,15 @@ namespace mbsopt {
 std::vector<Eigen::VectorXd> changes_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
                                              const std::vector<UnknownParameter>& unknowns);
 
+// Weighted squares of the samples of all records but one: at the solution, and where they are least without that one,
+// to first order and whatever the bounds.
+struct OthersWithout {
+  Eigen::Index samples = 0;
+  double before = 0, after = 0;
+};
+// Per record; record_of_member: its number, from 0. Stacks must have no equalities, and shared variables.
+std::vector<OthersWithout> others_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
+                                          const std::vector<UnknownParameter>& unknowns,
+                                          const std::vector<std::size_t>& record_of_member);
+
 }  // namespace mbsopt

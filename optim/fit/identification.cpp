@@ -4,16 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <iterator>
 #include <mutex>
+#include <numbers>
 #include <stdexcept>
 #include <utility>
 
 #include "core/expression/counted.hpp"
-#include "optim/fit/angle_doubts.hpp"
 #include "optim/fit/distributions.hpp"
 #include "optim/fit/fit_assessment.hpp"
 #include "optim/fit/fit_context.hpp"
+#include "optim/fit/fit_doubts.hpp"
 #include "optim/fit/fit_search.hpp"
 #include "optim/fit/parameter_profile.hpp"
 #include "optim/fit/validation.hpp"
@@ -54,6 +55,8 @@ class Identification {
       };
   }
 
+  const std::vector<AngleDoubt>& doubted_angles() const { return angles_; }
+
   IdentificationResult run() {
     const Stopwatch stopwatch;
     search();
@@ -93,7 +96,7 @@ class Identification {
       refuse_without_pull(stack, solution);
       assess(stack, solution, unknowns);
     }
-    warn_of(stack, solution, usable ? search.residuals_at_start() : Eigen::VectorXd());
+    warn_of(stack, solution, usable ? search.residuals_at_start() : Eigen::VectorXd(), unknowns);
     fit_.result.parameters = described(fit_, unknowns, values, fit_.result.statistics);
     fit_.shared = parameter_values(fit_.scene);
     for (std::size_t i = 0; i < unknowns.size(); ++i)
@@ -130,7 +133,8 @@ class Identification {
         pulling, counted(stack.samples(), "sample"), stack.loss.s(), counted(stack.variables(), "parameter"));
   }
 
-  void warn_of(const ExperimentStack& stack, const LeastSquaresResult& solution, const Eigen::VectorXd& at_start) {
+  void warn_of(const ExperimentStack& stack, const LeastSquaresResult& solution, const Eigen::VectorXd& at_start,
+               const std::vector<UnknownParameter>& unknowns) {
     for (const std::string& name : fit_.spec.variables)
       for (const Parameter& p : fit_.scene.parameters)
         if (p.name == name && is_held(p))
@@ -152,9 +156,9 @@ class Identification {
           "the model is wrong, or the fit ended in another minimum",
           beyond, counted(stack.samples(), "sample"), stack.loss.s()));
     doubt_sigmas();
-    if (!fit_.options.preflight) doubt_explanations();
-    for (std::string& doubt : angle_doubts(fit_.scene, fit_.spec, fit_.data, stack, at_start, z))
-      fit_.result.warnings.push_back(std::move(doubt));
+    if (!fit_.options.preflight)
+      std::ranges::move(doubts_of_fit(fit_, stack, solution, unknowns), std::back_inserter(fit_.result.warnings));
+    if (fit_.options.tests_angles) angles_ = angle_doubts(fit_, stack, at_start);
   }
 
   // Intervals that rest on the given sigmas. Beyond a factor of 2 an interval of 95 % holds the truth in 67 % at most.
@@ -173,33 +177,6 @@ class Identification {
         size, size > 1 ? "Sigma is too small, or the model is wrong" : "Sigma is too large"));
   }
 
-  // Channels whose residuals are larger than sigma explains, and than what the mean of the measured values leaves. The
-  // windows of a record are one channel.
-  void doubt_explanations() {
-    constexpr double kFactor = 2;  // of sigma: a static channel is its mean and noise
-    struct Sums {
-      double n = 0, mean = 0, spread = 0, residual = 0, scaled = 0;  // sums of squares about the mean, of m - y, of z
-    };
-    std::map<std::string, Sums> channels;
-    for (const ResidualRow& row : fit_.result.residuals) {
-      const ExperimentFit& experiment = fit_.result.experiments[row.experiment];
-      if (experiment.validate) continue;
-      Sums& s = channels[experiment.channels[row.channel].column];
-      const double from_mean = row.measured - s.mean;
-      s.mean += from_mean / ++s.n;
-      s.spread += from_mean * (row.measured - s.mean);  // Welford
-      s.residual += (row.measured - row.model) * (row.measured - row.model);
-      s.scaled += row.scaled * row.scaled;
-    }
-    for (const auto& [column, s] : channels) {
-      if (s.residual <= s.spread || s.scaled <= kFactor * kFactor * s.n) continue;
-      fit_.result.warnings.push_back(fmt::format(
-          "the fit explains nothing of '{}': its residuals are {:.3g} (rms), the measured values differ from their own "
-          "mean by {:.3g} (rms). A unit or the model is wrong, or the fit ended in another minimum: start elsewhere",
-          column, std::sqrt(s.residual / s.n), std::sqrt(s.spread / s.n)));
-    }
-  }
-
   void order_residuals() {
     std::stable_sort(fit_.result.residuals.begin(), fit_.result.residuals.end(),
                      [](const ResidualRow& a, const ResidualRow& b) { return a.experiment < b.experiment; });
@@ -210,8 +187,41 @@ class Identification {
   }
 
   FitContext fit_;
+  std::vector<AngleDoubt> angles_;
   std::mutex told_;
 };
+
+// Fits again with the likely columns in degrees, then with all doubted ones, which one logger wrote. Returns the doubts
+// about columns that are then explained better.
+std::vector<std::string> confirmed(const std::vector<AngleDoubt>& doubts, const Problem& problem,
+                                   const std::vector<CsvTable>& data, const IdentificationOptions& options,
+                                   const IdentificationResult& given) {
+  constexpr double kGain = 0.5;  // of what is unexplained; chance and a smaller signal change it far less
+  const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  IdentificationOptions again;
+  again.user_forces = options.user_forces, again.simulation_progress = options.simulation_progress;
+  again.preflight = options.preflight, again.threads = options.threads, again.tests_angles = false;
+  std::vector<std::string> words;
+  for (const bool all : {false, true}) {
+    if (!words.empty() || (all && std::ranges::all_of(doubts, &AngleDoubt::is_likely))) break;
+    std::vector<CsvTable> converted = data;
+    for (const AngleDoubt& doubt : doubts)
+      for (std::size_t e = 0; e < data.size(); ++e)
+        if ((all || doubt.is_likely) && record_name(experiments[e]) == doubt.record && data[e].has_column(doubt.column))
+          for (double& x : converted[e].columns[data[e].find_column(doubt.column)]) x *= std::numbers::pi / 180;
+    const IdentificationResult degrees = run_identification(problem, converted, again);
+    for (const AngleDoubt& doubt : doubts) {
+      const double before = unexplained(given, doubt.record, doubt.column),
+                   after = unexplained(degrees, doubt.record, doubt.column);
+      if ((all || doubt.is_likely) && after <= kGain * before)
+        words.push_back(fmt::format(
+            "{}: {}; in degrees, a fit leaves {:.2g} of the deviation of its values, not {:.2g}: is the column in "
+            "degrees? \"unit\": \"{}\" converts it, while numbers of sigma and bias stay in {}",
+            doubt.path, doubt.words, after, before, doubt.unit == "rad" ? "deg" : "deg/s", doubt.unit));
+    }
+  }
+  return words;
+}
 
 }  // namespace
 
@@ -219,8 +229,11 @@ IdentificationResult run_identification(const Problem& problem, const std::vecto
                                         const IdentificationOptions& options) {
   const CutProblem cut =
       cut_into_windows(what_measurements_need(problem), data, options.user_forces, options.simulation_progress);
-  IdentificationResult result = Identification(cut.problem, cut.data, options).run();
+  Identification identification(cut.problem, cut.data, options);
+  IdentificationResult result = identification.run();
   result.warnings.insert(result.warnings.begin(), cut.warnings.begin(), cut.warnings.end());
+  if (const std::vector<AngleDoubt>& doubts = identification.doubted_angles(); !doubts.empty())
+    std::ranges::move(confirmed(doubts, problem, data, options, result), std::back_inserter(result.warnings));
   return result;
 }
 
