@@ -161,7 +161,8 @@ TEST_CASE("design: loose bounds lead to the optimum of near ones, by every metho
   const TemporaryFolder folder;
   const auto problem = [&](double wide) {
     return fmt::format(R"({{"format": 1, "name": "bob", "gravity": [0, -9.81, 0],
-      "parameters": {{"r": {{"value": 0.9, "lower": 0.02, "upper": {0}}}, "z": {{"value": 0, "lower": -{0}, "upper": {0}}}}},
+      "parameters": {{"r": {{"value": 0.9, "lower": 0.02, "upper": {0}}},
+                     "z": {{"value": 0, "lower": -{0}, "upper": {0}}}}},
       "bodies": [{{"name": "arm", "mass": 3, "com": ["r", 0, 0], "inertia": [0.01, 0.01, 0.01]}}],
       "joints": [{{"name": "pin", "type": "revolute", "body2": "arm", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}}],
       "forces": [{{"name": "drag", "type": "rsda", "joint": "pin", "damping": 0.2}}],

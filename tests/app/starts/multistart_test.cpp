@@ -227,8 +227,8 @@ TEST_CASE("a multistart that is interrupted gives the best of its waterfall", "[
     text.replace(text.find("\"joints\""), 0, R"x("drives": [{"name": "motor", "type": "angle", "joint": "pin",
       "law": "0.02*k + free*sin(3*t)"}], )x");
     text.replace(text.find("{\"running\""), std::string::npos, R"({"track": [{"sensor": "tip_y", "file": "wish.csv",
-      "column": "y"}]}}, "design": {"minimize": "track", "variables": ["k", "free"], "optimizer": {"type": "least_squares"},
-      "multistart": {"starts": 4000, "seed": 5}}})");
+      "column": "y"}]}}, "design": {"minimize": "track", "variables": ["k", "free"],
+      "optimizer": {"type": "least_squares"}, "multistart": {"starts": 4000, "seed": 5}}})");
     std::string wish = "t,y\n";
     for (int i = 0; i <= 10; ++i)
       wish += std::to_string(0.1 * i) + "," + std::to_string(0.4 * std::sin(0.25 * i)) + "\n";
