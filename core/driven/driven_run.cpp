@@ -73,12 +73,7 @@ bool DrivenRun::go_to(double t) { return path_.go_to(t, shortest_, kMostStepsOfS
 
 void DrivenRun::stop_where_it_ends() {
   if (!path_.objection().empty()) return stop(SimulationStatus::not_credible, path_.objection());
-  const DrivenState& s = path_.state();
-  // The interval over which a jump is measured; it is long against the rounding of times.
-  const double beside = 1e-3 * (settings_.end_time - settings_.start_time);
-  const std::string jump =
-      law_jumps_.between(std::max(s.t - beside, settings_.start_time), std::min(s.t + beside, settings_.end_time));
-  stop(SimulationStatus::step_too_small, jump.empty() ? why_stuck(mechanism_, s.t, s.y) : jump);
+  stop(SimulationStatus::step_too_small, why_stuck(mechanism_, settings_, path_.state().t, path_.state().y));
 }
 
 SimulationResult DrivenRun::finish() {

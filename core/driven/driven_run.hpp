@@ -22,7 +22,7 @@
 #include "core/scene/settings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/driven_path.hpp"
-#include "core/watch/law_jumps.hpp"
+#include "core/start/law_jumps.hpp"
 
 namespace mbsopt {
 

@@ -14,6 +14,7 @@
 #include "core/linear/dense.hpp"
 #include "core/start/driven_path.hpp"
 #include "core/start/free_motion.hpp"
+#include "core/start/law_jumps.hpp"
 
 namespace mbsopt {
 namespace {
@@ -232,7 +233,13 @@ SingularPosition singular_position(const Mechanism& mechanism, double t, const V
   return s;
 }
 
-std::string why_stuck(const Mechanism& mechanism, double t, const VectorXd& y) {
+std::string why_stuck(const Mechanism& mechanism, const SimulationSettings& settings, double t, const VectorXd& y) {
+  // The interval over which a jump is measured; it is long against the rounding of times.
+  const double beside = 1e-3 * (settings.end_time - settings.start_time);
+  const std::string jump =
+      LawJumps(mechanism.data())
+          .between(std::max(t - beside, settings.start_time), std::min(t + beside, settings.end_time));
+  if (!jump.empty()) return jump;
   DrivenRows rows(mechanism.data());
   const SingularPosition here = rank_at(mechanism.data(), rows, t, y);
   const std::string why = here.owners.empty()
@@ -270,6 +277,7 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
     result.message = fmt::format("stopped at t = {:.6g} s", k.t());
     return result;
   };
+  LawJumps law_jumps(mechanism.data());
   long tried = 0;
   for (std::size_t i = 0; i < times.size(); ++i) {
     double h = times[i] - k.t();
@@ -286,14 +294,17 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
       const double left = times[i] - k.t();
       h = std::min({h, left, k.step_limit()});
       const bool last = h >= left * (1 - 1e-12);
-      if (k.advance(h, last ? times[i] : k.t() + h)) {
+      const double t = k.t();
+      if (k.advance(h, last ? times[i] : t + h)) {
+        result.message = law_jumps.between(t, k.t());
+        if (!result.message.empty()) return result;
         ++result.steps;
         h *= 2;
         continue;
       }
       h /= 2;
       if (h < 1e-9 * std::max(1e-3, times.back() - times.front())) {
-        result.message = k.objection().empty() ? why_stuck(mechanism, k.t(), k.point().y) : k.objection();
+        result.message = k.objection().empty() ? why_stuck(mechanism, settings, k.t(), k.point().y) : k.objection();
         return result;
       }
     }

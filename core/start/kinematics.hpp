@@ -42,7 +42,8 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
 // The singular position of a state, with half of its window.
 SingularPosition singular_position(const Mechanism& mechanism, double t, const Eigen::VectorXd& y, double half);
 
-// The reason why the positions cannot be continued from a state at t, in words.
-std::string why_stuck(const Mechanism& mechanism, double t, const Eigen::VectorXd& y);
+// The reason why the positions cannot be continued from a state at t, in words: a jump of a law, or the position.
+std::string why_stuck(const Mechanism& mechanism, const SimulationSettings& settings, double t,
+                      const Eigen::VectorXd& y);
 
 }  // namespace mbsopt

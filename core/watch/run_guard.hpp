@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/mechanism/mechanism_data.hpp"
-#include "core/watch/law_jumps.hpp"
+#include "core/start/law_jumps.hpp"
 
 namespace mbsopt {
 

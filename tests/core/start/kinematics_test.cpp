@@ -6,6 +6,7 @@
 
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/kinematic_scene.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
@@ -223,6 +224,19 @@ TEST_CASE("a slider that moves away from a dead point stays on its branch", "[ki
     changed += worst < 1e-8 ? 0 : 1;
   }
   CHECK(changed == 0);
+}
+
+TEST_CASE("kinematics refuses a drive whose rate jumps in the words of a simulation", "[kinematics]") {
+  Scene scene = slider_crank();
+  scene.drives.push_back(angle_drive("A", "0.3 + 2*abs(t - 0.237)"));
+  scene.simulation.end_time = 0.5;
+  const Mechanism mechanism(scene, VectorXd());
+  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), scene.simulation, times(0.5, 50),
+                                                   [](std::size_t, const StatePoint&) { return true; });
+  CHECK_FALSE(result.ok);
+  CHECK_THAT(result.message, Catch::Contains("changes its rate by 4 1/s at once at t = 0.237 s"));
+  CHECK(result.last_good_time == Approx(0.23));
+  CHECK(simulate(mechanism, scene.simulation).message == result.message);
 }
 
 TEST_CASE("kinematics of a body that no joint holds is refused", "[kinematics]") {

@@ -1,4 +1,4 @@
-#include "core/watch/law_jumps.hpp"
+#include "core/start/law_jumps.hpp"
 
 #include <fmt/format.h>
 
