@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/body/hermite.hpp"
+#include "core/driven/timed_instants.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/start/kinematics.hpp"
@@ -25,6 +27,12 @@ constexpr long kMostStepsOfStretch = 32 * static_cast<long>(kStepsPerPanel);
 // Two ends of a path are the same if they differ by less than this part of the rest of the run. `shortest_` is far
 // less.
 constexpr double kSameEnd = 1e-6;
+// A running cost is evaluated at instants at most this part of the run apart, and at most max_step. A peak of this
+// width meets one of them. The nodes of eight panels are that near.
+constexpr double kApart = 1.0 / 75;
+// A running cost that differs from the polynomial through the nodes by this part of its size has a peak between them.
+// Smooth costs differ less: a panel turns bodies by 1.6 rad, Hermite's cubic over a tenth of it errs by 1e-4.
+constexpr double kPeak = 1e-3;
 // A panel of any length may be off by this part of rtol times the integral so far: it may hold a kink or a jump.
 constexpr double kPartOfRun = 0.1;
 
@@ -56,6 +64,8 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
     if (costs[o].running) running_.push_back({costs[o].running.get(), static_cast<Eigen::Index>(o)});
   }
   if (!running_.empty()) nodes_.resize(kNodes);
+  if (!running_.empty() && !options.frozen)
+    instants_ = timed_instants(mechanism, costs, settings.start_time, settings.end_time, shortest_);
   g_.resize(running_.size() * kNodes);
   integrals_.resize(running_.size()), errors_.resize(running_.size());
   path_.start(settings.start_time, settings.end_time, start.result().y, start.result().angles);
@@ -161,7 +171,7 @@ double DrivenRun::frozen_end(const Course& course) const {
 double DrivenRun::next_end(Course& course, double t) const {
   const double stop_at = course.events.stop_after(t);
   course.h = std::min(course.h, largest_panel());
-  const double t1 = course.h >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + course.h;
+  const double t1 = resolved_until(instants_, t, course.h >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + course.h);
   // Without integrals a panel ends at the next event, so that no part of the path is solved twice.
   const double event = schedule_.next_time();
   return running_.empty() && event > t ? std::min(t1, event) : t1;
@@ -208,7 +218,6 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
     for (std::size_t r = 0; r < running_.size(); ++r) g_[r * kNodes + k] = value_of(running_[r], point_of(nodes_[k]));
   }
   if (!go_to(t1)) return Panel::stuck;
-  const IntegratorSettings& s = settings_.integrator;
   for (std::size_t r = 0; r < running_.size(); ++r) {
     std::array<double, kNodes> g;
     double shortest = shortest_;
@@ -216,15 +225,46 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
       g[k] = g_[r * kNodes + k];
       if (is_left_out(g[k], nodes_[k].t)) g[k] = 0, shortest = window_at(nodes_[k].t)->half;
     }
-    const PanelIntegral I = integrals_[r] = integrate_panel(g, h);
+    integrals_[r] = integrate_panel(g, h);
     if (options_.frozen || h <= shortest) continue;
-    // Exponentials of smooth extremes have any size, so atol does not apply to them.
-    const bool is_extreme = costs_[static_cast<std::size_t>(running_[r].objective)].is_extreme;
-    const double of_panel = s.rtol * I.absolute + (is_extreme ? 0 : s.atol * h);
-    const double of_run = kPartOfRun * s.rtol * (absolute_(running_[r].objective) + I.absolute);
-    if (I.error > std::max(of_panel, of_run)) return Panel::refused;  // the end of the run reports NaN
+    if (integrals_[r].error > allowed_error(r, h)) return Panel::refused;  // the end of the run reports NaN
   }
-  return Panel::accepted;
+  return !options_.frozen && hides_a_peak(h) ? Panel::refused : Panel::accepted;
+}
+
+double DrivenRun::allowed_error(std::size_t r, double h) const {
+  const IntegratorSettings& s = settings_.integrator;
+  // Exponentials of smooth extremes have any size, so atol does not apply to them.
+  const Cost& cost = costs_[static_cast<std::size_t>(running_[r].objective)];
+  const double of_panel = s.rtol * integrals_[r].absolute + (cost.is_extreme ? 0 : s.atol * h);
+  return std::max(of_panel, kPartOfRun * s.rtol * (absolute_(running_[r].objective) + integrals_[r].absolute));
+}
+
+// A peak as wide as the distance of the instants, which differs by D from the polynomial there, adds D times the
+// distance to the integral.
+bool DrivenRun::hides_a_peak(double h) {
+  const double apart =
+      std::min(kApart * (settings_.end_time - settings_.start_time), settings_.integrator.max_step.value_or(INFINITY));
+  for (std::size_t k = 1; k < nodes_.size(); ++k) {
+    const DrivenState &a = nodes_[k - 1], &b = nodes_[k];
+    const double gap = b.t - a.t, parts = std::ceil(gap / apart);
+    for (double j = 1; j < parts; ++j) {
+      const double t = a.t + j / parts * gap;
+      hermite(a.y, b.y, gap, j / parts, y_);
+      const StatePoint between{t, y_, a.angles, continued()};
+      const std::array<double, kNodes> P = polynomial_at((t - from_.t) / h);
+      for (std::size_t r = 0; r < running_.size(); ++r) {
+        const double g = running_[r].cost->value(between);
+        double expected = 0, size = std::abs(g);
+        for (std::size_t i = 0; i < kNodes; ++i) {
+          expected += P[i] * g_[r * kNodes + i], size = std::max(size, std::abs(g_[r * kNodes + i]));
+        }
+        const double D = std::abs(g - expected);
+        if (D > kPeak * size && D * gap / parts > allowed_error(r, h)) return true;
+      }
+    }
+  }
+  return false;
 }
 
 // The value of a term, which is NaN if it has no limit at a singular position.

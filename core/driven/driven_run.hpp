@@ -4,6 +4,10 @@
 //   integral of g dt    sum over panels of Gauss-Kronrod's 15 nodes (kronrod.hpp), panels halved until
 //                       error <= rtol integral of |g| + atol h       over the panel, or a part of it over the run
 //
+// Two nodes of a panel may enclose a narrow peak that neither formula sees. So g is also evaluated between nodes that
+// are more than max_step or a 75th of the run apart, on Hermite's cubic, and compared with the polynomial through
+// the nodes. Panels resolve what changes with time alone in any case (timed_instants.hpp).
+//
 // The panels are the steps of the result: given again (RunOptions::frozen), they make psi a smooth function of rho.
 #pragma once
 
@@ -65,6 +69,8 @@ class DrivenRun {
   double next_end(Course& course, double t) const;
   void try_shorter(Course& course, Panel outcome, double t, double t1);
   Panel try_panel(double t1);
+  double allowed_error(std::size_t r, double h) const;
+  bool hides_a_peak(double h);
   double largest_panel() const;
   bool take_panel(double t1, const Take& take);
   void add_quadrature_errors();
@@ -96,6 +102,8 @@ class DrivenRun {
   std::vector<DrivenTerm> running_;  // of one node
   std::vector<DrivenTerm> at_instant_;
   std::vector<DrivenState> nodes_;  // of the panel; none without running costs
+  Eigen::VectorXd y_;               // between two nodes
+  std::vector<double> instants_;    // at which functions of time change
   DrivenState from_;                // the start of the panel
   std::vector<double> g_;           // running cost x node
   Eigen::VectorXd absolute_;        // integral of |g| so far, per cost

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/hermite.hpp"
 #include "core/expression/program_switches.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/mechanism_data.hpp"
@@ -109,13 +110,8 @@ void JumpWatch::begin(const StatePoint& at) {
 }
 
 void JumpWatch::place_at(double theta) {
-  const double h = t1_ - t0_, s2 = theta * theta, s3 = s2 * theta;
-  const Eigen::Index n = y0_.size() / 2;
-  t_ = t0_ + theta * h;
-  y_.resize(2 * n);
-  const auto q0 = y0_.head(n), v0 = y0_.tail(n), q1 = y1_.head(n), v1 = y1_.tail(n);
-  y_.head(n) = q0 + (3 * s2 - 2 * s3) * (q1 - q0) + h * ((s3 - 2 * s2 + theta) * v0 + (s3 - s2) * v1);
-  y_.tail(n) = (6 * theta - 6 * s2) / h * (q1 - q0) + (3 * s2 - 4 * theta + 1) * v0 + (3 * s2 - 2 * theta) * v1;
+  t_ = t0_ + theta * (t1_ - t0_);
+  hermite(y0_, y1_, t1_ - t0_, theta, y_);
 }
 
 void JumpWatch::set_inputs_at(double theta, const Function& f) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/body/hermite.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -90,13 +92,8 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
 // The time of a pole within the step, or kNone.
 double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
   const double h = step.h;
-  const Eigen::Index n = step.y0.size() / 2;
-  const auto q0 = step.y0.head(n), v0 = step.y0.tail(n), q1 = step.y1.head(n), v1 = step.y1.tail(n);
-  y_.resize(2 * n);
   const auto size = [&](double s) {
-    const double s2 = s * s, s3 = s2 * s;
-    y_.head(n) = q0 + (3 * s2 - 2 * s3) * (q1 - q0) + h * ((s3 - 2 * s2 + s) * v0 + (s3 - s2) * v1);
-    y_.tail(n) = (6 * s - 6 * s2) / h * (q1 - q0) + (3 * s2 - 4 * s + 1) * v0 + (3 * s2 - 2 * s) * v1;
+    hermite(step.y0, step.y1, h, s, y_);
     return std::abs(cost.value({step.t + s * h, y_, step.angles0, motion_}));
   };
   double at = 0, largest = -1;

@@ -1,0 +1,22 @@
+// What functions of time alone tell about a run before it: the instants at which they change (time_parts.hpp). They are
+// those of the laws of drives (second derivatives, which move the forces), of forces, of running costs, and samples.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/mechanism/mechanism.hpp"
+#include "core/run/cost.hpp"
+
+namespace mbsopt {
+
+// Ascending instants of a run, its start and end among them, that are more than `apart` apart. Between two of them each
+// function is like a cubic.
+std::vector<double> timed_instants(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
+                                   double apart);
+
+// The latest end of a panel from t that is not after t1 and resolves the functions: it is at most some times as long as
+// the shortest interval between instants in it.
+double resolved_until(const std::vector<double>& instants, double t, double t1);
+
+}  // namespace mbsopt
