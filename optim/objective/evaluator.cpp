@@ -203,10 +203,10 @@ std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd&
   if (std::none_of(objectives_.begin(), objectives_.end(), [](const Objective& o) { return o.is_extreme(); }))
     return values;
   const Mechanism mechanism(scene_, rho, std::vector<bool>(active_.size(), false), options_.user_forces, programs_);
-  const SimulationResult run = simulate(mechanism, scene_.simulation, {}, {}, {nullptr, options_.progress});
-  if (!run.ok()) return values;
+  const Evaluation e = run(rho, Sweep::none, nullptr);  // the costs decide on the panels of a solved run
+  if (!e.ok) return values;
   const std::vector<std::optional<double>> found =
-      true_extremes(simulated(), mechanism, scene_.simulation, run.steps, options_.progress);
+      true_extremes(simulated(), mechanism, scene_.simulation, e.steps, options_.progress);
   for (std::size_t j = 0; j < found.size(); ++j) values[simulated_[j]] = found[j];
   return values;
 }

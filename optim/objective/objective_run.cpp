@@ -7,12 +7,13 @@
 #include <limits>
 
 #include "core/cvodes/cvodes.hpp"
+#include "core/run/output_times.hpp"
 
 namespace mbsopt {
 namespace {
 
-// The largest of successive values, and the tops of parabolas through each three whose middle is highest, if they
-// exceed it. A top is only a place to evaluate: between few points the value may be anything.
+// The largest of successive values, and places where the value may be larger. Tops of parabolas through each three
+// values whose middle is highest are such places: between few points the value may be anything.
 class Peak {
  public:
   void add(double t, double x) {
@@ -25,17 +26,30 @@ class Peak {
     if (!(s0 < 0 && s2 > 0)) return;
     const double d0 = (x_[0] - x_[1]) / s0, d2 = (x_[2] - x_[1]) / s2;
     const double c = (d2 - d0) / (s2 - s0), b = d0 - c * s0;
-    if (c < 0) tops_.push_back({t_[1] - b / (2 * c), x_[1] - b * b / (4 * c)});
+    if (!(c < 0)) return;
+    const double rise = kRise * (x_[1] - std::min(x_[0], x_[2]));
+    tops_.push_back({t_[0], t_[1] - b / (2 * c), t_[2], x_[1] - b * b / (4 * c), x_[1] + rise, t_[1]});
   }
   double largest() const { return largest_; }
   void add_places(std::vector<double>& times) const {
     for (const Top& top : tops_)
       if (top.x > largest_) times.push_back(top.t);
   }
+  // Takes the brackets of tops that may exceed the largest value by the part rtol of it, and halves their sides.
+  void refine(double rtol, std::vector<double>& times) {
+    for (const Top& top : tops_) {
+      if (!(std::max(top.x, top.bound) > largest_ + rtol * std::abs(largest_))) continue;
+      for (const double t : {top.t0, (top.t0 + top.t1) / 2, top.t1, (top.t1 + top.t2) / 2, top.t2, top.t})
+        times.push_back(t);
+    }
+    tops_.clear(), count_ = 0;
+  }
 
  private:
+  // A peak that three values do not resolve may rise above the middle one by a multiple of the rise to it.
+  static constexpr double kRise = 4;
   struct Top {
-    double t, x;
+    double t0, t, t2, x, bound, t1;
   };
   double largest_ = -std::numeric_limits<double>::infinity();
   double t_[3] = {}, x_[3] = {};
@@ -70,22 +84,34 @@ std::vector<std::optional<double>> extremes_of(const std::vector<ExtremeOf>& all
     }
   }
   if (tracked.empty()) return values;
-  constexpr int kPoints = 8;
   Sampling sampling;
+  sampling.times = output_times(settings);  // no row of a trajectory exceeds a true extreme
   for (std::size_t i = 0; i < steps.times.size(); ++i) {
-    for (int j = 0; j < kPoints; ++j) sampling.times.push_back(steps.times[i] + j * steps.sizes[i] / kPoints);
+    const double points = std::max(8.0, std::ceil(steps.sizes[i] / settings.integrator.max_step.value_or(INFINITY)));
+    for (double j = 0; j < points; ++j) sampling.times.push_back(steps.times[i] + j * steps.sizes[i] / points);
   }
-  sampling.times.push_back(settings.end_time);
   sampling.observe = [&](std::size_t, const StatePoint& at) {
     for (Tracked& t : tracked) t.peak.add(at.t, t.side * t.x->value(at));
   };
   // CVODES takes its own steps again.
   const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, progress};
-  if (!simulate(mechanism, settings, {}, sampling, options).ok()) return values;
-  sampling.times.clear();
-  for (const Tracked& t : tracked) t.peak.add_places(sampling.times);
-  std::sort(sampling.times.begin(), sampling.times.end());
-  if (!sampling.times.empty() && !simulate(mechanism, settings, {}, sampling, options).ok()) return values;
+  // Integrated runs have dense output that their steps resolve. Solved ones may have narrow peaks: their brackets are
+  // halved as often as a hundredth of the run needs for 1e-4 of itself.
+  constexpr int kHalvings = 14;
+  for (int halvings = 0;; ++halvings) {
+    std::sort(sampling.times.begin(), sampling.times.end());
+    sampling.times.erase(std::unique(sampling.times.begin(), sampling.times.end()), sampling.times.end());
+    const SimulationResult run = simulate(mechanism, settings, {}, sampling, options);
+    if (!run.ok()) return values;
+    sampling.times.clear();
+    const bool last = halvings == (run.statistics.solved ? kHalvings : 1);
+    for (Tracked& t : tracked) {
+      if (last) continue;
+      run.statistics.solved ? t.peak.refine(settings.integrator.rtol, sampling.times)
+                            : t.peak.add_places(sampling.times);
+    }
+    if (sampling.times.empty()) break;
+  }
   for (const Tracked& t : tracked) values[t.index] = t.side * t.peak.largest();
   return values;
 }

@@ -47,7 +47,8 @@ class ObjectiveRun {
 };
 
 // The true extreme of each objective that is one, on given steps. It evaluates the dense output at eight points of each
-// step, and at higher tops of parabolas through three of them. So the motion reaches the value. There is none if
+// step, at the times of the rows of a trajectory, and at higher tops of parabolas through three of them. If the motion
+// is solved, it halves the brackets of these tops until rtol. So the motion reaches the value. There is none if
 // progress, called after steps as in RunOptions, stops the search.
 std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
                                                  const Mechanism& mechanism, const SimulationSettings& settings,
