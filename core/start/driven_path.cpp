@@ -31,7 +31,7 @@ constexpr int kHalvings = 4;  // of it, for motions with faster waves: rounding 
 constexpr double kExact = 1e-10, kAccepted = 1e-7, kPartOfRoughness = 1e-3;
 constexpr double kNotZero = 0.1;  // of the rise over half a window: a least regularity above it is not zero
 
-constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
+constexpr double kAlmostHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
 
 Vector3d rotation_vector(const Bushing& b, const Eigen::VectorXd& y) {
   const Eigen::AngleAxisd turn(
@@ -47,7 +47,7 @@ std::string past_half_turn(const MechanismData& d, const Eigen::VectorXd& before
     if (b.Kt.isZero(0) && b.Ct.isZero(0)) continue;
     const Vector3d from = rotation_vector(b, before), to = rotation_vector(b, y);
     const double angle = to.norm();
-    if (angle < kHalfTurn && !(to.dot(from) < 0 && angle + from.norm() > std::numbers::pi)) continue;
+    if (angle < kAlmostHalfTurn && !(to.dot(from) < 0 && angle + from.norm() > std::numbers::pi)) continue;
     return fmt::format(
         "forces[{}], the bushing between '{}' and '{}', is turned by {:.4g} rad at t = {:.6g} s: at half a turn its "
         "torque jumps from one side to the other. Keep it below (a stop, stiffer or damped rubber, a slower start), or "

@@ -8,9 +8,9 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kJump = 1e-9;       // relative to the law; below it a difference has vanished
-constexpr double kRounding = 1e-12;  // [m, rad, and these per s]: of 1 in exp(t) - 1
-constexpr double kPart = 0.471;      // not half: jumps are at round times, where a law may have no value
+constexpr double kJump = 1e-9;            // relative to the law; below it a difference has vanished
+constexpr double kRoundingOfLaw = 1e-12;  // [m, rad, and these per s]: of 1 in exp(t) - 1
+constexpr double kPart = 0.471;           // not half: jumps are at round times, where a law may have no value
 
 std::string drive_of(const MechanismData& d, const RowLaw& law) {
   return law.drive >= 0 ? d.drive_names[static_cast<std::size_t>(law.drive)] : "?";
@@ -46,7 +46,7 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1)
   const double shortest = 1e-14 * std::max(std::abs(t0), std::abs(t1));
   while (true) {
     const double left = difference(a, b, t1 - t0);
-    if (!std::isfinite(left) || std::abs(left) <= std::max(kJump * size, kRounding)) return {};
+    if (!std::isfinite(left) || std::abs(left) <= std::max(kJump * size, kRoundingOfLaw)) return {};
     const double middle = t0 + kPart * (t1 - t0);
     if (t1 - t0 <= shortest || middle <= t0 || middle >= t1) return {t1, value(b) - value(a)};
     const TimeLaw::Jet m = at(law, middle);
