@@ -38,7 +38,7 @@ Signal blows(Interpolation how, double dt, double end, int n, const std::vector<
 struct Run {
   double v, v_tlm, v_adjoint;  // at the end, and its derivatives in P
 };
-Run run(const Scene& scene) {
+Run run_of(const Scene& scene) {
   const Mechanism mechanism(scene, nominal(scene));
   const std::vector<Cost> costs{{nullptr, std::make_shared<Speed>(), {}, "v"}};
   const SimulationResult tlm = simulate_tlm(mechanism, scene.simulation, costs, {}, {});
@@ -74,7 +74,7 @@ TEST_CASE("pulses of laws are resolved wherever they lie", "[pulses]") {
   }));
   CAPTURE(method, force);
   const Scene scene = cart(force, end, method);
-  const Run r = run(scene);
+  const Run r = run_of(scene);
   const double ramp = std::string(force).starts_with("0.1") ? 0.05 * end * end : 0;
   CHECK(r.v - ramp == Approx(1.7 * impulse).epsilon(1e-4));
   CHECK(r.v_tlm == Approx(impulse).epsilon(1e-4));
@@ -88,7 +88,7 @@ TEST_CASE("blows among the samples of a signal are resolved", "[pulses]") {
   Scene scene = cart("(40 + 1000*P*u)/P", 9, method);
   scene.signals = {blows(how, 1.0 / 2048, 9, 4, {1, 5000, 11311})};
   scene.parameters[0].value = 2;
-  const Run r = run(scene);
+  const Run r = run_of(scene);
   const Curve& u = *scene.signals[0].curve;
   double sum = 0;  // by Simpson's rule, exact between samples
   for (std::size_t i = 0; i + 1 < u.x().size(); ++i) {
