@@ -18,12 +18,12 @@ namespace {
 
 constexpr double kNoise = 0.01;
 
-// Runs of one pendulum that start at 1.5, 1.6, ... rad. The start of each is free.
-struct Runs {
+// Record of one pendulum that start at 1.5, 1.6, ... rad. The start of each is free.
+struct Record {
   Problem problem = pendulum::problem(64.4, 0.06, 1.5, 1.5);
   std::vector<CsvTable> data;
 
-  explicit Runs(unsigned runs, double noise = kNoise) {
+  explicit Record(unsigned runs, double noise = kNoise) {
     problem.identification.emplace();
     problem.identification->variables = {"w2", "c"};
     for (unsigned e = 0; e < runs; ++e) {
@@ -48,7 +48,7 @@ struct Runs {
 };
 
 // A second channel of the first run: the same sensor under another name.
-void add_column(Runs& runs, const std::string& name, const std::vector<double>& values) {
+void add_column(Record& runs, const std::string& name, const std::vector<double>& values) {
   ChannelSpec channel = runs.problem.identification->experiments[0].channels[0];
   channel.column = name;
   runs.problem.identification->experiments[0].channels.push_back(channel);
@@ -66,7 +66,7 @@ std::vector<double> with_noise(std::vector<double> values, double sigma, unsigne
 
 TEST_CASE("a copy of a channel is named, also with a little noise of its own, or with its sign turned",
           "[identification][doubts]") {
-  Runs runs(1);
+  Record runs(1);
   CHECK(runs.warnings().empty());
   SECTION("a plain copy") { add_column(runs, "copy", runs.data[0].columns[1]); }
   SECTION("with noise") { add_column(runs, "copy", with_noise(runs.data[0].columns[1], 0.1 * kNoise, 9)); }
@@ -81,7 +81,7 @@ TEST_CASE("a copy of a channel is named, also with a little noise of its own, or
 
 TEST_CASE("two sensors of one angle are no copies, even where the model errs alike in both",
           "[identification][doubts]") {
-  Runs runs(1);
+  Record runs(1);
   const CsvTable exact = pendulum::exact_motion(64, 0.055, 1.5, 1.55, 2);
   add_column(runs, "second", with_noise(exact.columns[1], kNoise, 7));
   CHECK(runs.warnings().empty());
@@ -94,7 +94,7 @@ TEST_CASE("two sensors of one angle are no copies, even where the model errs ali
 
 TEST_CASE("a run that disagrees with two others is named, whatever the sigmas are", "[identification][doubts]") {
   const SigmaEstimate how = GENERATE(SigmaEstimate::none, SigmaEstimate::shared, SigmaEstimate::own);
-  Runs runs(3);
+  Record runs(3);
   runs.estimate(how);
   CHECK(runs.warnings().empty());
   std::vector<double>& x = runs.data[2].columns[1];
@@ -115,7 +115,7 @@ TEST_CASE("a run that disagrees with two others is named, whatever the sigmas ar
 
 TEST_CASE("an estimated sigma far above the given one is doubted, and one that no file gives is not",
           "[identification][doubts][sigma]") {
-  Runs runs(1);
+  Record runs(1);
   runs.estimate(SigmaEstimate::shared);
   Field& sigma = runs.problem.identification->experiments[0].channels[0].sigma;
   sigma = 0.3 * kNoise;
@@ -130,7 +130,7 @@ TEST_CASE("an estimated sigma far above the given one is doubted, and one that n
 
 TEST_CASE("a channel that an estimated sigma gives up is doubted, one that rests is not",
           "[identification][doubts][sigma]") {
-  Runs runs(1);
+  Record runs(1);
   runs.problem.scene.sensors.push_back(runs.problem.scene.sensors[0]);
   runs.problem.scene.sensors[1].name = "rate", runs.problem.scene.sensors[1].quantity = "rate";
   std::vector<double> rate{1.55};
@@ -149,7 +149,7 @@ TEST_CASE("a channel that an estimated sigma gives up is doubted, one that rests
 }
 
 TEST_CASE("a loss that takes samples out names their rows, and the rest is judged", "[identification][doubts][loss]") {
-  Runs runs(1);
+  Record runs(1);
   runs.data[0].name = "run.csv";
   runs.problem.identification->loss = {LossType::tukey};
   CHECK(runs.warnings().empty());
@@ -167,7 +167,7 @@ TEST_CASE("a loss that takes samples out names their rows, and the rest is judge
 TEST_CASE("a record is asked about degrees only if degrees explain it better", "[identification][doubts]") {
   // The model starts near rest and stays there: its damping is held far too large. The record spans twenty times as
   // much, in radians.
-  Runs runs(1);
+  Record runs(1);
   runs.problem.scene.parameters[1].lower = runs.problem.scene.parameters[1].upper = 60;
   runs.problem.scene.parameters[1].value = 60;
   ExperimentSpec& e = runs.problem.identification->experiments[0];
@@ -177,7 +177,7 @@ TEST_CASE("a record is asked about degrees only if degrees explain it better", "
 }
 
 TEST_CASE("intervals of logarithmic parameters are products, and those at a bound have one side", "[identification]") {
-  Runs runs(1);
+  Record runs(1);
   Parameter &w2 = runs.problem.scene.parameters[0], &c = runs.problem.scene.parameters[1];
   w2.scale = ParameterScale::log;
   c.lower = 0.1, c.value = 0.2;  // the record has 0.055
@@ -194,7 +194,7 @@ TEST_CASE("intervals of logarithmic parameters are products, and those at a boun
 TEST_CASE("estimated sigmas end in the best optimum of their likelihood", "[identification][sigma]") {
   // A column of another pendulum, with a tenth of the noise: the likelihood has an optimum at either, and the one at
   // the quiet column is better by n log 10.
-  Runs runs(1);
+  Record runs(1);
   const CsvTable other = pendulum::exact_motion(61, 0.055, 1.5, 1.55, 2);
   add_column(runs, "quiet", with_noise(other.columns[1], 0.1 * kNoise, 8));
   runs.estimate(SigmaEstimate::shared);

@@ -11,7 +11,9 @@ using Catch::Contains;
 namespace {
 
 std::vector<std::string> doubts(const Problem& problem, GradientMethod method, double* slope = nullptr) {
-  Evaluator evaluator(problem.scene, objectives_of(problem), {}, {method});
+  EvaluatorOptions options;
+  options.method = method;
+  Evaluator evaluator(problem.scene, objectives_of(problem), {}, options);
   const Evaluation& e = evaluator.gradients(evaluator.start());
   INFO(e.message);
   REQUIRE(e.ok);
