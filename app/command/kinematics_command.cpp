@@ -64,20 +64,21 @@ bool are_numbers(const DriveEfforts& efforts, const KinematicsResult& kinematics
 }
 
 void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
-  if (efforts.rows.empty() || efforts.table.rows.empty()) return;
   TextTable table({"drive", "least", "largest", "unit"});
   for (std::size_t k = 1; k < efforts.table.columns.size(); ++k) {
     double least = INFINITY, largest = -INFINITY;
     for (const std::vector<double>& row : efforts.table.rows) {
       least = std::min(least, row[k]), largest = std::max(largest, row[k]);
     }
+    if (largest < least) continue;  // no number at all
     const std::string& name = efforts.table.columns[k];
     const auto drive = std::ranges::find(scene.drives, name, &Drive::name);
     const std::string unit = drive == scene.drives.end() ? "N or N m" : unit_of_effort(*drive);
     run.result["drives"][name] = {{"force_min", least}, {"force_max", largest}, {"unit", unit}};
     table.add({name, significant(least, 6), significant(largest, 6), unit});
   }
-  run.context.out << "\nforce or torque of each drive along its coordinate\n" << table.text();
+  if (run.result.contains("drives"))
+    run.context.out << "\nforce or torque of each drive along its coordinate\n" << table.text();
 }
 
 // Returns their times, for the plots.

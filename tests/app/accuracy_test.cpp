@@ -259,7 +259,7 @@ TEST_CASE("a fit takes the integrator that its first experiment needs", "[accura
   INFO(outcome.out << outcome.err);
   REQUIRE(outcome.exit_code == kDone);
   const auto result = json_of(folder.path / "out/result.json");
-  CHECK(result.at("accuracy").at("errors").contains("motion"));
+  CHECK(result.at("accuracy").at("errors").contains("sensors"));
   CHECK(result.at("accuracy").at("reached") == true);
 }
 

@@ -467,7 +467,7 @@ TEST_CASE("the adjoint of CVODES does not step over a stop that the forward run 
   add_parameters(s, {{"w", 0.5}});
   s.gravity = {0.0, 0.0, 0.0};
   Rsda stop;
-  stop.joint = "A", stop.law = f("-1e6*max(0, angle - 0.5)^2");
+  stop.joint = "A", stop.law = f("1e6*max(0, angle - 0.5)^2");
   s.forces = {{"stop", stop}};
   s.conditions = {value_of("theta", "0"), rate_of("theta", "w")};
   s.simulation.end_time = 6;

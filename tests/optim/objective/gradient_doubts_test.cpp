@@ -23,11 +23,17 @@ std::vector<std::string> doubts(const Problem& problem, GradientMethod method, d
 
 }  // namespace
 
-TEST_CASE("a gradient through a stop that the steps do not know is said to be wrong, by every method", "[gradient]") {
+TEST_CASE(
+    "a gradient through a stop that the steps do not know is said to be wrong, unless sensitivities choose the steps",
+    "[gradient]") {
   const GradientMethod method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint, GradientMethod::cvodes_forward);
   double slope = 0;
   const std::vector<std::string> said = doubts(mbsopt::testing::stopped_body(), method, &slope);
   INFO("d end/d h = " << slope);
+  if (method == GradientMethod::cvodes_forward) {  // controls the error of the sensitivities
+    CHECK(slope == Approx(1).epsilon(1e-6));
+    return CHECK(said.empty());
+  }
   REQUIRE(std::abs(slope - 1) > 1e-3);
   REQUIRE(said.size() == 1);
   CHECK_THAT(said[0], Contains("the gradient of objective 'end' is wrong") && Contains("force 'stop' has a kink"));
