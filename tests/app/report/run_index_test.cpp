@@ -33,7 +33,7 @@ TEST_CASE("the index lists all runs of its folder and holds their numbers", "[re
   const std::string page = run_index(folder.path);
   CHECK(contains(page, R"(<a href="a%20%231/report.html">a #1</a>)"));
   CHECK(contains(page, "<td>b</td><td>simulate</td><td>failed</td>"));  // no report, hence no link
-  CHECK(contains(page, R"("objective path <\/script> [m^2]":0.25)"));
+  CHECK(contains(page, R"("objective path \u003c/script> [m^2]":0.25)"));
   CHECK(contains(page, R"("parameter k [N/m]":3)"));
   CHECK_FALSE(contains(page, "foreign_run"));
   CHECK_FALSE(contains(page, "broken_run"));

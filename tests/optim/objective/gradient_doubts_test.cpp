@@ -32,7 +32,8 @@ TEST_CASE(
   INFO("d end/d h = " << slope);
   if (method == GradientMethod::cvodes_forward) {  // controls the error of the sensitivities
     CHECK(slope == Approx(1).epsilon(1e-6));
-    return CHECK(said.empty());
+    CHECK(said.empty());
+    return;
   }
   REQUIRE(std::abs(slope - 1) > 1e-3);
   REQUIRE(said.size() == 1);
