@@ -85,7 +85,9 @@ bool is_an_optimum(const Json& record) {
 }
 
 bool same_optimum(const Json& a, const Json& b, const Scene& scene) {
-  return same_parameters(a, b, scene) || same_motion(a, b);
+  // Parameters may cost something without any effect on the motion.
+  const auto objective = [](const Json& record) { return Json::array({record["objective"]}); };
+  return same_parameters(a, b, scene) || (same_numbers(objective(a), objective(b)) && same_motion(a, b));
 }
 
 std::vector<DistinctOptimum> distinct_optima(const std::vector<Json>& ranked, const Scene& scene) {
