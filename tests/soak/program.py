@@ -116,9 +116,9 @@ class Program:
         line = [self.path, command, str(file), *(("--out", str(folder)) if folder else ()), *arguments]
         for path, value in dict(settings).items():
             line += ["--set", f"{path}={value if isinstance(value, str) else json.dumps(value)}"]
+        for left in ("result.json", "trajectory.csv") if folder else ():
+            (Path(folder) / left).unlink(missing_ok=True)
         folder = Path(folder or file)
-        for left in ("result.json", "trajectory.csv"):
-            (folder / left).unlink(missing_ok=True)
         patience *= self.patience
         start, told = time.monotonic(), command + "".join(" " + word for word in line[5:])
         process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL)
