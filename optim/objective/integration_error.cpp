@@ -91,7 +91,7 @@ std::vector<std::string> unresolved_gradients(const Scene& scene, const std::vec
     const double worst = errors.row(i).maxCoeff(&k);
     const double size = std::max(sized.row(i).maxCoeff(), kNothing * std::abs(psi(i)));
     // An objective of the size of atol is zero to the integrator, and its gradient rounding.
-    if (!(worst > kResolved * std::max(size, scene.simulation.integrator.atol))) continue;
+    if (size == 0 || !(worst > kResolved * std::max(size, scene.simulation.integrator.atol))) continue;
     sentences.push_back(fmt::format(
         "the steps do not resolve the gradient of objective '{}': another run with {} the integration errors "
         "changes its entry of '{}' by {:.2g}, {:.2g} % of the largest. {}",
