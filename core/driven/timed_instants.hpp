@@ -1,5 +1,5 @@
-// What functions of time alone tell about a run before it: the instants at which they change (time_parts.hpp). They are
-// those of the laws of drives (second derivatives, which move the forces), of forces, of running costs, and samples.
+// Finds, before a run, the instants at which functions of time alone change (time_parts.hpp): laws of drives (second
+// derivatives, which move the forces), forces, running costs and samples.
 #pragma once
 
 #include <span>

@@ -74,7 +74,7 @@ double PulseWatch::integral(const Function& f, double from, double to) {
   return h <= 0 ? 0 : 0.5 * h * (value(f, middle - node) + value(f, middle + node));
 }
 
-// Of a spline each piece counts as a cubic of Hermite with the slopes of parabolas: this reads each sample once.
+// A piece of a spline counts as a cubic of Hermite with the slopes of parabolas: this reads each sample once.
 void PulseWatch::integrate(Function& f) {
   f.integral.reserve(f.size());
   f.integral.push_back(0);

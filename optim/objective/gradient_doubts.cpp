@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-// What differences of free runs say against the gradients. undecided: their own errors hide an answer.
+// Differences of free runs contradict gradients, in words. undecided is set if their own errors hide an answer.
 std::vector<std::string> contradictions(const Evaluator& evaluator, const Evaluation& at, bool& undecided) {
   constexpr double kDigitsFewer = 1e4, kBest = 1e-6, kWorst = 1e-4;
   constexpr double kNothing = 1e-3;  // of psi: as unresolved_gradients() does
