@@ -9,6 +9,7 @@
 #include "app/results/trajectory_csv.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/state_point.hpp"
+#include "core/run/output_times.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "optim/objective/integration_error.hpp"
 

@@ -20,7 +20,6 @@ struct Trajectory {
   std::vector<std::vector<double>> rows;  // one value per column
 };
 
-std::vector<double> output_times(const SimulationSettings& settings);
 std::vector<std::string> trajectory_columns(const Scene& scene);
 
 // A Sampling that appends a row to the trajectory at each output time. Both arguments must outlive it.

@@ -1,4 +1,4 @@
-// What a fit says about its records: copies, runs that disagree, wrong units, samples that a loss takes out.
+// Fits name copies of columns, runs that disagree, wrong units, and samples that a loss takes out.
 #include "optim/fit/fit_doubts.hpp"
 
 #include <fmt/format.h>
