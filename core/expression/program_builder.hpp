@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
-#include <tuple>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -137,12 +136,32 @@ class ProgramBuilder {
   int number(double value) { return add({Operation::number, -1, -1, value}); }
   int partial(const Program& of, const Instruction& in, int a, int b, int value, bool first);
 
+  // Its number; that of an equal instruction if there is one. A table of numbers with open addressing, at most half
+  // full.
   int add(const Instruction& instruction) {
-    const auto key = std::make_tuple(static_cast<int>(instruction.operation), instruction.a, instruction.b,
-                                     std::bit_cast<std::uint64_t>(instruction.constant));
-    const auto [it, is_new] = known_.emplace(key, static_cast<int>(code().size()));
-    if (is_new) code().push_back(instruction);
-    return it->second;
+    if (2 * code().size() >= known_.size()) {
+      known_.assign(std::max<std::size_t>(64, 4 * code().size()), -1);
+      for (std::size_t i = 0; i < code().size(); ++i) place_of(code()[i]) = static_cast<int>(i);
+    }
+    int& known = place_of(instruction);
+    if (known < 0) {
+      known = static_cast<int>(code().size());
+      code().push_back(instruction);
+    }
+    return known;
+  }
+
+  int& place_of(const Instruction& in) {
+    const std::uint64_t bits = std::bit_cast<std::uint64_t>(in.constant);
+    std::uint64_t h = bits;
+    for (const int part : {static_cast<int>(in.operation), in.a, in.b})
+      h = (h ^ static_cast<std::uint64_t>(part + 2)) * 0x9E3779B97F4A7C15ull + (h >> 29);
+    const auto is_same = [&](const Instruction& other) {
+      return other.operation == in.operation && other.a == in.a && other.b == in.b &&
+             std::bit_cast<std::uint64_t>(other.constant) == bits;
+    };
+    for (std::size_t k = h % known_.size();; k = (k + 1) % known_.size())
+      if (known_[k] < 0 || is_same(code()[static_cast<std::size_t>(known_[k])])) return known_[k];
   }
 
   void keep_only_what_reaches(int result) {
@@ -176,18 +195,9 @@ class ProgramBuilder {
   double constant(int i) { return code()[static_cast<std::size_t>(i)].constant; }
   bool is(int i, double value) { return is_number(i) && constant(i) == value; }
 
-  struct KeyHash {
-    std::size_t operator()(const std::tuple<int, int, int, std::uint64_t>& key) const {
-      std::uint64_t h = std::get<3>(key);
-      for (const int part : {std::get<0>(key), std::get<1>(key), std::get<2>(key)})
-        h = (h ^ static_cast<std::uint64_t>(part + 2)) * 0x9E3779B97F4A7C15ull + (h >> 29);
-      return static_cast<std::size_t>(h);
-    }
-  };
-
   const Symbols& symbols_;
   Program& program_;
-  std::unordered_map<std::tuple<int, int, int, std::uint64_t>, int, KeyHash> known_;
+  std::vector<int> known_;                     // numbers of instructions, by their hash; -1: free
   std::unordered_map<std::string, int> done_;  // definitions, by name
   std::unordered_set<std::string> open_;       // definitions being emitted
 };
