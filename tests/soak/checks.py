@@ -447,24 +447,41 @@ def loose_bounds(lab):
 
 
 def interrupted(lab):
-    """A sweep that a signal ends and `resume` goes on with has the rows of one that nothing ends."""
+    """A sweep, and the starts of a design, that a signal ends and `resume` goes on with are those that nothing ends."""
     parameters = lab.problem.get("parameters")
     if not parameters:
         return []
     name = sorted(parameters)[0]
     value, size = parameters[name]["value"], 0.01 * lab.parameter_sizes()[name]
     points = ("--threads", "1", "--vary", f"{name}={value - size!r}:{value + size!r}:12")
-    whole = lab.run("sweep", arguments=points, patience=3)
-    if not whole.ok:
+    design = {"minimize": sorted(lab.problem["objectives"])[0], "variables": [name],
+              "optimizer": {"max_iterations": 2, "max_evaluations": 4}, "multistart": {"starts": 5, "seed": 3}}
+    lab.variant("starts", lab.problem | {
+        "design": design, "parameters": parameters | {name: {"value": value, "lower": value - size, "upper": value + size}}})
+
+    def rows(run):
+        table = run.folder / "sweep.csv"
+        return table.read_text().splitlines() if table.exists() else []
+
+    def ends(run):
+        starts = run.result.get("multistart", {}).get("waterfall", [])
+        return [{key: start[key] for key in start if key != "wall_seconds"} for start in starts]
+    return (broken_off(lab, "sweep", "scene", points, rows)
+            + broken_off(lab, "design", "starts", ("--threads", "1"), ends))
+
+
+def broken_off(lab, command, file, arguments, results):
+    whole = lab.run(command, {}, arguments, file, patience=3)
+    if not results(whole):
         return []
-    instant = random.Random(name).uniform(0.1, 0.9) * whole.seconds
-    cut = lab.run("sweep", {}, points + ("--keep-journal",), interrupt=instant)
+    instant = random.Random(command + lab.problem["name"]).uniform(0.1, 0.9) * whole.seconds
+    cut = lab.run(command, {}, (*arguments, "--keep-journal"), file, interrupt=instant)
     if not (cut.folder / "journal.jsonl").exists():
         return []
-    lab.resume(cut)
-    rows = [(run.folder / "sweep.csv").read_text().splitlines() for run in (whole, cut)]
-    if rows[0] != rows[1]:
-        return [("interrupted", f"{sum(a != b for a, b in zip(*rows))} of {len(rows[0])} rows differ after resume")]
+    found = [results(whole), results(lab.resume(cut))]
+    if found[0] != found[1]:
+        differ = sum(a != b for a, b in zip(*found)) or "the number"
+        return [("interrupted", f"{command}: {differ} of {len(found[0])} results differ after resume")]
     return []
 
 
