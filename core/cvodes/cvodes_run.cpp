@@ -290,6 +290,7 @@ double ForwardRun::stop_before_pulse(double t, PulseWatch& pulses) {
   CVodeGetCurrentStep(memory(), &h);  // that of the next step; 0 before the first one, which is short
   h = std::min(h, left);
   const auto is_missed = [&](const PulseWatch::Doubt& doubt) {
+    if (doubt.share > 0) return doubt.share > kMissed * settings_.integrator.rtol;
     const Flow::Numbers y(y_now_.data(), y_now_.size());
     if (!flow_.evaluate(doubt.beside, y)) return false;
     y_change_ = flow_.ydot();
@@ -340,7 +341,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     jumps->begin({t, y_now_, assembly_.result().angles, flow_.motion()});
   }
   // CVODES sees the rates at the ends of a step.
-  PulseWatch pulses(mechanism_, t, end, {{0, 0.5, 0.5}, {1, 0.5, -0.5}});
+  PulseWatch pulses(mechanism_, costs_, t, end, {{0, 0.5, 0.5}, {1, 0.5, -0.5}});
   Eigen::VectorXd y_before;
   while (t < end) {
     require(CVodeSetStopTime(memory(), stop_before_pulse(t, pulses)));

@@ -4,11 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "core/expression/program_switches.hpp"
-#include "core/expression/time_parts.hpp"
-#include "core/force/forces.hpp"
-#include "core/mechanism/mechanism_data.hpp"
 #include "core/run/kinks.hpp"
+#include "core/run/timed_laws.hpp"
 
 namespace mbsopt {
 namespace {
@@ -42,27 +39,9 @@ void add_chords(const KinkedSignal& signal, std::vector<double>& instants) {
 
 std::vector<double> timed_instants(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
                                    double apart) {
-  const MechanismData& d = mechanism.data();
-  const int P = static_cast<int>(d.rho.size());
-  std::vector<double> inputs(d.rho.begin(), d.rho.end()), instants{start, end};
-  inputs.resize(inputs.size() + 3, 0.0);  // t comes next, or after the motion of a law of force
-  const auto add = [&](const Program& f, int time) {
-    const std::vector<double> pieces = pieces_of(f, time, inputs, start, end);
-    instants.insert(instants.end(), pieces.begin(), pieces.end());
-  };
-  const auto add_parts = [&](const Program& f, int time) {
-    for (const Program& part : time_parts_of(f, P, time)) add(part, time);
-  };
-  for (const RowLaw& law : d.laws)
-    if (law.law.programs && !law.law.smooth) add((*law.law.programs)[2], P);
-  d.forces->for_each([&]<class Kind>(const Kind& f) {
-    if constexpr (HasLaw<Kind>)
-      if (f.law.program) add_parts(*f.law.program, P + 2);
-  });
-  for (const AppliedForce& f : d.applied)
-    for (const Program& component : f.components) add_parts(component, P);
-  for (const Cost& cost : costs)
-    if (const SwitchedProgram* const g = cost.running ? cost.running->program() : nullptr) add_parts(g->program, P);
+  std::vector<double> instants{start, end};
+  for (const TimedLaw& law : timed_laws(mechanism, costs, start, end))
+    instants.insert(instants.end(), law.pieces.begin(), law.pieces.end());
   for (const KinkedSignal& signal : kinks_of(mechanism, costs)) add_chords(signal, instants);
   std::erase_if(instants, [&](double t) { return t < start || t > end; });
   std::sort(instants.begin(), instants.end());

@@ -34,7 +34,7 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
       attempt_(mechanism_, settings_, rk_, tolerances_),
       guard_(mechanism_.data()),
       penalty_(mechanism_.data()),
-      pulses_(mechanism_, settings.start_time, settings.end_time, pulse_nodes(method)) {}
+      pulses_(mechanism_, costs, settings.start_time, settings.end_time, pulse_nodes(method)) {}
 
 // Never beyond the end; an adaptive run does not leave a tiny last step.
 double RungeKuttaRun::propose_step(double t, double h, double end, bool adaptive) const {
@@ -243,7 +243,8 @@ bool RungeKuttaRun::passes_over_pulse(Course& course) {
   const double least = std::max(kShortest * course.span, settings_.integrator.options.min_step.value_or(0));
   double worst = 0;
   for (const PulseWatch::Doubt& doubt : pulses_.doubts(attempt_.step.t, course.h, course.adaptive)) {
-    const double error = attempt_.change_by(doubt.at, doubt.beside, doubt.duration);
+    const double error = doubt.share > 0 ? doubt.share / settings_.integrator.rtol
+                                         : attempt_.change_by(doubt.at, doubt.beside, doubt.duration);
     if (course.adaptive && course.h > least) {
       worst = std::max(worst, error);
       continue;

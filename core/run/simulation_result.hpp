@@ -36,10 +36,11 @@ struct Jump {
   bool motion = false;          // and whether it depends on the motion
 };
 
-// A pulse of a signal or of a force's law that a step passes over (pulse_watch.hpp).
+// A pulse of a function of time that a step passes over (pulse_watch.hpp).
 struct Pulse {
-  int signal = -1, force = -1;  // the index in the scene of one of both; none: a table in a law
-  double t = 0, error = 0;      // error: of the velocities, relative
+  int signal = -1, force = -1,
+      drive = -1;           // the index in the scene of one of them; of none: a table, or a running cost
+  double t = 0, error = 0;  // error: of the velocities, or of the cost, relative
 };
 
 struct SimulationStatistics {

@@ -136,13 +136,17 @@ Warning missed_pulse(const Scene& scene, const SimulationStatistics& statistics)
   const Pulse& pulse = statistics.pulse;
   if (!(pulse.error > kPulse)) return {};
   const auto signal = static_cast<std::size_t>(pulse.signal);
-  const std::string what = pulse.force >= 0
-                               ? "the law of force '" + scene.forces[static_cast<std::size_t>(pulse.force)].name + "'"
-                           : signal < scene.signals.size() ? "signal '" + scene.signals[signal].name + "'"
+  const auto named = [](const char* kind, const auto& all, int k) {
+    return fmt::format("{} '{}'", kind, all[static_cast<std::size_t>(k)].name);
+  };
+  const std::string what = pulse.force >= 0                ? named("the law of force", scene.forces, pulse.force)
+                           : pulse.drive >= 0              ? named("the law of drive", scene.drives, pulse.drive)
+                           : pulse.signal < 0              ? "a running cost"
+                           : signal < scene.signals.size() ? named("signal", scene.signals, pulse.signal)
                                                            : "a table or spline of a law";
   return fmt::format(
-      "the steps pass over a pulse of {} near t = {:.6g} s, which changes velocities by {:.1g} of their size: {}", what,
-      pulse.t, pulse.error,
+      "the steps pass over a pulse of {} near t = {:.6g} s, which changes {} by {:.1g} of their size: {}", what,
+      pulse.t, pulse.signal + pulse.force + pulse.drive < -2 ? "its integrals" : "velocities", pulse.error,
       scene.simulation.integrator.step ? "take a smaller simulation.integrator.step, or leave it out"
                                        : "set simulation.integrator.max_step to less than its duration");
 }

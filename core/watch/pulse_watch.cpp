@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/expression/time_parts.hpp"
-#include "core/force/forces.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
@@ -35,85 +33,83 @@ std::vector<QuadratureNode> pulse_nodes(const Method& method) {
   return nodes;
 }
 
-PulseWatch::PulseWatch(const Mechanism& mechanism, double start, double end, std::vector<QuadratureNode> nodes)
-    : nodes_(std::move(nodes)) {
-  const MechanismData& d = mechanism.data();
-  parameters_ = static_cast<int>(d.rho.size());
-  inputs_.assign(d.rho.begin(), d.rho.end());
-  for (std::size_t k = 0; k < d.kinks.size(); ++k) {
-    if (d.kinks[k].curve->x().size() < kFewest) continue;
-    functions_.push_back({{static_cast<int>(k), -1, 0, 0}, {}, 0, d.kinks[k].curve, d.kinks[k].delay, {}, {}});
+PulseWatch::PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
+                       std::vector<QuadratureNode> nodes)
+    : nodes_(std::move(nodes)), inputs_(timed_inputs(mechanism)) {
+  const std::vector<KinkedSignal>& signals = mechanism.data().kinks;
+  for (std::size_t k = 0; k < signals.size(); ++k)
+    functions_.push_back({{.signal = static_cast<int>(k)}, {}, signals[k].curve, signals[k].delay, {}});
+  for (TimedLaw& law : timed_laws(mechanism, costs, start, end)) {
+    law.part.grow(scratch_);
+    functions_.push_back({{.force = law.force, .drive = law.drive}, std::move(law), nullptr, 0, {}});
   }
-  d.forces->for_each([&]<class Kind>(const Kind& f) {
-    if constexpr (HasLaw<Kind>)
-      if (f.law.program) add_parts(*f.law.program, parameters_ + 2, f.force, start, end);
-  });
-  for (const AppliedForce& f : d.applied)
-    for (const Program& component : f.components) add_parts(component, parameters_, f.force, start, end);
-}
-
-void PulseWatch::add_parts(const Program& program, int time, int force, double start, double end) {
-  inputs_.resize(std::max(inputs_.size(), static_cast<std::size_t>(time) + 1), 0.0);
-  for (Program& part : time_parts_of(program, parameters_, time)) {
-    part.grow(scratch_);
-    std::vector<double> pieces = pieces_of(part, time, inputs_, start, end);
-    if (pieces.size() < kFewest) continue;
-    functions_.push_back({{-1, force, 0, 0}, std::move(part), time, nullptr, 0, std::move(pieces), {}});
-  }
+  std::erase_if(functions_, [](const Function& f) { return f.size() < kFewest; });
 }
 
 double PulseWatch::value(const Function& f, double t) {
   if (f.curve) return f.curve->at(t - f.delay);
-  inputs_[static_cast<std::size_t>(f.time)] = t;
-  return f.part.value(inputs_, scratch_);
+  inputs_[static_cast<std::size_t>(f.law.time)] = t;
+  return f.law.part.value(inputs_, scratch_);
 }
 
 // Gauss's rule of two points, exact for cubics.
-double PulseWatch::integral(const Function& f, double from, double to) {
+PulseWatch::Integrals PulseWatch::integrals(const Function& f, double from, double to) {
   const double h = to - from, middle = 0.5 * (from + to), node = h / std::sqrt(12.0);
-  return h <= 0 ? 0 : 0.5 * h * (value(f, middle - node) + value(f, middle + node));
+  if (h <= 0) return {};
+  const double f0 = 0.5 * h * value(f, middle - node), f1 = 0.5 * h * value(f, middle + node);
+  return {f0 + f1, middle * (f0 + f1) + node * (f1 - f0)};
 }
 
 // A piece of a spline counts as a cubic of Hermite with the slopes of parabolas: this reads each sample once.
 void PulseWatch::integrate(Function& f) {
-  f.integral.reserve(f.size());
-  f.integral.push_back(0);
-  for (std::size_t i = 0; i + 1 < f.size(); ++i) {
-    double sum = 0;
+  f.until.reserve(f.size());
+  Integrals sum;
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    f.until.push_back(sum);
+    if (i + 1 == f.size()) break;
+    Integrals piece;
     if (!f.curve) {
-      sum = integral(f, f.pieces[i], f.pieces[i + 1]);
+      piece = integrals(f, f.t(i), f.t(i + 1));
     } else {
       const std::vector<double>&x = f.curve->x(), &y = f.curve->y();
       const double h = x[i + 1] - x[i];
       const Interpolation how = f.curve->interpolation();
-      sum = how == Interpolation::hold ? h * y[i] : 0.5 * h * (y[i] + y[i + 1]);
-      if (how == Interpolation::spline) sum += h * h / 12 * (slope_at(x, y, i) - slope_at(x, y, i + 1));
+      piece.f = how == Interpolation::hold ? h * y[i] : 0.5 * h * (y[i] + y[i + 1]);
+      if (how == Interpolation::spline) piece.f += h * h / 12 * (slope_at(x, y, i) - slope_at(x, y, i + 1));
+      piece.ft = 0.5 * (f.t(i) + f.t(i + 1)) * piece.f;
+      if (how != Interpolation::hold) piece.ft += h * h / 12 * (y[i + 1] - y[i]);
     }
-    f.integral.push_back(f.integral.back() + sum);
+    sum.f += piece.f, sum.ft += piece.ft;
+    f.of_size += std::abs(piece.f);
   }
 }
 
-double PulseWatch::integral_to(const Function& f, double t) {
+PulseWatch::Integrals PulseWatch::integrals_to(const Function& f, double t) {
   std::size_t low = 0, high = f.size();  // the last instant until t, or the first one
   while (high - low > 1) (f.t((low + high) / 2) <= t ? low : high) = (low + high) / 2;
-  return t < f.t(0) ? -integral(f, t, f.t(0)) : f.integral[low] + integral(f, f.t(low), t);
+  const bool before = t < f.t(0);
+  const Integrals rest = before ? integrals(f, t, f.t(0)) : integrals(f, f.t(low), t);
+  const double sign = before ? -1 : 1;
+  return {f.until[low].f + sign * rest.f, f.until[low].ft + sign * rest.ft};
 }
 
 void PulseWatch::look_at(Function& f, double t, double h, bool noticed) {
   while (f.next < f.size() && f.t(f.next) <= t) ++f.next;
   if (f.next + 1 >= f.size() || f.t(f.next + 1) >= t + h) return;  // no piece lies inside
-  if (f.integral.empty()) integrate(f);
-  double mean = 0, null = 0;
+  if (f.until.empty()) integrate(f);
+  double mean = 0, so_far = 0, null = 0;
   for (const QuadratureNode& n : nodes_) {
     const double there = value(f, t + n.c * h);
-    mean += n.b * there, null += n.e * there;
+    mean += n.b * there, so_far += n.b * (1 - n.c) * there, null += n.e * there;
   }
   if (nodes_.size() == 1) null = 0;
-  const double missed = std::abs(integral_to(f, t + h) - integral_to(f, t) - h * mean);
-  const double share = f.curve ? 1 : kShareOfLaw;
-  if (!(missed > (noticed ? share * h * std::abs(null) : f.largest))) return;
+  const Integrals i0 = integrals_to(f, t), i1 = integrals_to(f, t + h);
+  const double at_end = std::abs(i1.f - i0.f - h * mean);
+  const double in_mean = std::abs(((t + h) * (i1.f - i0.f) - (i1.ft - i0.ft)) / h - h * so_far);
+  const double missed = std::max(at_end, in_mean), seen = h * std::abs(null);
+  if (!(noticed ? at_end > (f.curve ? 1 : kShareOfLaw) * seen || in_mean > seen : missed > f.largest)) return;
   const auto differs = [&](std::size_t i) {
-    return std::abs(f.integral[i + 1] - f.integral[i] - mean * (f.t(i + 1) - f.t(i)));
+    return std::abs((f.until[i + 1].f - f.until[i].f) / (f.t(i + 1) - f.t(i)) - mean);
   };
   std::size_t piece = f.next, last = f.next;
   for (; last + 1 < f.size() && f.t(last + 1) <= t + h; ++last)
@@ -126,7 +122,8 @@ void PulseWatch::look_at(Function& f, double t, double h, bool noticed) {
   if (!(change > 0)) return;
   if (!noticed) f.largest = 2 * missed;
   f.pulse.t = at;
-  doubts_.push_back({f.pulse, at, beside, missed / change});
+  const bool is_cost = !f.curve && f.pulse.force < 0 && f.pulse.drive < 0;
+  doubts_.push_back({f.pulse, at, beside, missed / change, is_cost ? missed / f.of_size : 0});
 }
 
 const std::vector<PulseWatch::Doubt>& PulseWatch::doubts(double t, double h, bool noticed) {

@@ -1,24 +1,26 @@
 // Pulses of functions of time that a step passes over. The nodes of the step do not see them, so its error estimate
 // does not, either.
 //
-// A function f of time has a known integral I over a step. The step takes Q = h sum_i b_i f(t + c_i h) instead.
-//   D = |I - Q|             what the step misses
-//   E = h |sum_i e_i f_i|   what its nodes notice, by the null rule (quadrature_watch.hpp)
-// If D > E, or 0.02 E of a law, the step is in doubt. Let f differ most from Q/h at t*, and less than half as much at
-// t'. The accelerations a at both instants, in one state, say how much the velocities miss:  D (a(t*) - a(t'))/(f(t*) -
-// f(t')). So a rough record costs nothing where nodes notice it, and a pulse below the tolerances costs two
-// evaluations.
+// A function f of time has a known integral I over a step, and a mean J = int f (t1 - t)/h dt of its integrals so far.
+// The step takes sums over its nodes instead, Q = h sum_i b_i f(t + c_i h) and R = h sum_i b_i (1 - c_i) f(t + c_i h).
+//   D = max(|I - Q|, |J - R|)   what the step misses: at its end, and in the mean, as of a fast step of a drive
+//   E = h |sum_i e_i f_i|       what its nodes notice, by the null rule (quadrature_watch.hpp)
+// If D > E, or |I - Q| > 0.02 E of a law, the step is in doubt. Let f differ most from Q/h at t*, and less than half as
+// much at t'. The accelerations a at both instants, in one state, say how much the velocities miss:  D (a(t*) - a(t'))/
+// (f(t*) - f(t')). So a rough record costs nothing where nodes notice it, and a pulse below the tolerances costs two
+// evaluations. A running cost misses D itself.
 //
-//   PulseWatch watch(mechanism, start, end, pulse_nodes(method));
+//   PulseWatch watch(mechanism, costs, start, end, pulse_nodes(method));
 //   for (const PulseWatch::Doubt& doubt : watch.doubts(t, h)) ...
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
-#include "core/expression/program.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/run/simulation_result.hpp"
+#include "core/run/timed_laws.hpp"
 #include "core/watch/quadrature_watch.hpp"
 
 namespace mbsopt {
@@ -28,43 +30,45 @@ std::vector<QuadratureNode> pulse_nodes(const Method& method);
 
 class PulseWatch {
  public:
-  PulseWatch(const Mechanism& mechanism, double start, double end, std::vector<QuadratureNode> nodes);
+  PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
+             std::vector<QuadratureNode> nodes);
 
   struct Doubt {
     Pulse pulse;        // without its error
     double at, beside;  // t* and t' [s]
     double duration;    // D/|f(t*) - f(t')|  [s]
+    double share;       // D of the integral of |f| over the run: of a running cost, else 0
   };
   // The functions in doubt over a step. Steps begin later than, or where, those before began. noticed: what nodes
   // notice is rejected elsewhere. The result holds until the next call.
   const std::vector<Doubt>& doubts(double t, double h, bool noticed = true);
 
  private:
+  struct Integrals {
+    double f = 0, ft = 0;  // of f and f t
+  };
   struct Function {
     Pulse pulse;
-    Program part;  // of a law of time, whose input `time` is t; or samples
-    int time = 0;
+    TimedLaw law;  // or samples
     std::shared_ptr<const Curve> curve;
     double delay = 0;
-    std::vector<double> pieces;    // of a law: f is smooth between these instants
-    std::vector<double> integral;  // up to each instant, from the first doubt on
+    std::vector<Integrals> until;  // each instant, from the first doubt on
     std::size_t next = 0;          // the first instant after the step's start
     double largest = 0;            // D of a doubt, where nothing rejects it
+    double of_size = 0;            // the integral of |f|
 
-    std::size_t size() const { return curve ? curve->x().size() : pieces.size(); }
-    double t(std::size_t i) const { return curve ? curve->x()[i] + delay : pieces[i]; }
+    std::size_t size() const { return curve ? curve->x().size() : law.pieces.size(); }
+    double t(std::size_t i) const { return curve ? curve->x()[i] + delay : law.pieces[i]; }
   };
-  void add_parts(const Program& program, int time, int force, double start, double end);
   double value(const Function& f, double t);
-  double integral(const Function& f, double from, double to);  // where f is smooth
-  double integral_to(const Function& f, double t);
+  Integrals integrals(const Function& f, double from, double to);  // where f is smooth
+  Integrals integrals_to(const Function& f, double t);
   void integrate(Function& f);
   void look_at(Function& f, double t, double h, bool noticed);
 
   const std::vector<QuadratureNode> nodes_;
   std::vector<Function> functions_;
-  std::vector<double> inputs_;  // all parameters, the motion as 0, t
-  int parameters_;
+  std::vector<double> inputs_;
   Program::Scratch scratch_;
   std::vector<Doubt> doubts_;
 };
