@@ -19,6 +19,12 @@ Vector3d cylinder_inertia(double r, double h) {
 
 }  // namespace
 
+int sizes_of(const std::string& type) {
+  if (type == "sphere") return 1;
+  if (type == "capsule" || type == "cylinder") return 2;
+  return type == "ellipsoid" || type == "box" ? 3 : 0;
+}
+
 double volume(const Geom& g) {
   if (g.type == "sphere") return sphere_volume(g);
   if (g.type == "cylinder") return cylinder_volume(g);
@@ -43,7 +49,12 @@ ImportedShape shape_of(const Geom& g) {
   const Vector3d centre = g.at.translation();
   if (g.type == "sphere") return {"sphere", centre, centre, g.size(0)};
   if (g.type == "ellipsoid") return {"sphere", centre, centre, g.size.mean()};
-  if (g.type == "box") return box_shape(g.size, g.at);
+  if (g.type == "box") {
+    Eigen::Index longest = 0;
+    const double length = g.size.maxCoeff(&longest);
+    const Vector3d half = length * Vector3d::Unit(longest);
+    return {"box", g.at * Vector3d(-half), g.at * half, (g.size - half).maxCoeff()};
+  }
   const Vector3d half(0, 0, g.size(1));
   return {g.type == "capsule" ? "rod" : "cylinder", g.at * Vector3d(-half), g.at * half, g.size(0)};
 }

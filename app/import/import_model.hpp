@@ -12,7 +12,7 @@ namespace mbsopt {
 
 struct ImportedProblem {
   std::string name;                   // the model's name, used for the file
-  std::string text;                   // the problem file; its comments contain the lists, too
+  std::string text = {};              // the problem file; its comments contain the lists, too
   std::vector<std::string> changed;   // changed content, in sentences
   std::vector<std::string> warnings;  // why simulate fails: bodies without mass that no joint holds
   std::vector<std::string> dropped;   // omitted parts: "line 12: joint range"

@@ -5,10 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 
 #include "app/files/json_text.hpp"
-#include "app/import/model_reader.hpp"
+#include "app/import/unique_names.hpp"
 #include "core/expression/expression.hpp"
 #include "core/scene/type_table.hpp"
 
@@ -17,6 +16,8 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+constexpr double kSmoothVelocity = 0.01;  // a tenth of a slow joint's rate (docs/forces.md) [rad/s], [m/s]
 
 // Rotations leave some 1e-17 in entries that should be 0; relative to `scale` this is rounding.
 double rounded(double value, double scale) {
@@ -33,21 +34,28 @@ Json list(const Vector& v, double scale) {
 
 class ProblemWriter {
  public:
-  ProblemWriter(const ImportedModel& model, double smooth_velocity, std::vector<std::string>& renamed)
-      : model_(model), smooth_velocity_(smooth_velocity), renamed_(renamed) {
+  explicit ProblemWriter(ImportedModel& model) : model_(model) {
     for (const ImportedBody& b : model.bodies) reach_ = std::max(reach_, b.frame.translation().norm());
-    for (const ImportedJoint& j : model.joints)
+    bool dry = false;
+    for (const ImportedJoint& j : model.joints) {
       reach_ = std::max({reach_, j.between.translation().norm(), j.point.norm()});
+      dry = dry || j.coulomb != 0;
+    }
+    if (dry)
+      model.changed.push_back(fmt::format(
+          "dry friction does not stick: it is smoothed over {} rad/s, m/s (smooth_velocity)", kSmoothVelocity));
   }
 
   Json problem() {
-    Json json{{"format", 1}, {"name", model_.name}, {"gravity", list(model_.gravity, model_.gravity.norm())}};
-    json["bodies"] = Json::array();
-    for (std::size_t i = 1; i < model_.bodies.size(); ++i) json["bodies"].push_back(body(model_.bodies[i]));
-    json["joints"] = Json::array();
+    Json bodies = Json::array();
+    for (std::size_t i = 1; i < model_.bodies.size(); ++i) bodies.push_back(body(model_.bodies[i]));
     for (const ImportedJoint& j : model_.joints) add(j);
     for (const ImportedTie& t : model_.ties) add(t);
-    json["joints"] = joints_;
+    Json json{{"format", 1},
+              {"name", model_.name},
+              {"gravity", list(model_.gravity, model_.gravity.norm())},
+              {"bodies", bodies},
+              {"joints", joints_}};
     if (!forces_.empty()) json["forces"] = forces_;
     if (!sensors_.empty()) json["sensors"] = sensors_;
     json["simulation"] = {{"start_time", 0}, {"end_time", 1}};
@@ -71,8 +79,8 @@ class ProblemWriter {
     Eigen::Quaterniond e(b.frame.linear());
     if (e.w() < 0) e.coeffs() *= -1;
     if (e.vec().norm() > 0) json["orientation"] = list(Eigen::Vector4d(e.w(), e.x(), e.y(), e.z()), 1);
-    Names names({"O"}, &renamed_);
-    for (const auto& [name, at] : b.points) json["points"][names.identifier(name)] = point(at);
+    UniqueNames names(UniqueNames::Kind::identifier, {"O"}, &model_.changed);
+    for (const auto& [name, at] : b.points) json["points"][names.add(name)] = point(at);
     for (const ImportedShape& s : b.shapes)
       json["shape"].push_back({{"type", s.type}, {"from", point(s.from)}, {"to", point(s.to)}, {"radius", s.radius}});
     return json;
@@ -98,18 +106,30 @@ class ProblemWriter {
       json["normal2"] = direction(j.axis.unitOrthogonal());
     }
     joints_.push_back(json);
-    if (turns) sensor_of(j, "angle");
-    if (slides) sensor_of(j, "displacement");
     if (j.type == "spherical" && j.damping != 0) add_ball_damping(j, b1, b2);
-    if (turns && (j.damping != 0 || j.stiffness != 0)) add_rsda(j);
-    if (slides && j.stiffness != 0) add_spring(j, b1, b2, json);
-    if ((turns || slides) && (j.coulomb != 0 || (slides && j.damping != 0)))
+    if (!turns && !slides) return;
+    const std::string value = add_sensor(j.name, {{"quantity", turns ? "angle" : "displacement"}, {"joint", j.name}});
+    if (turns && (j.damping != 0 || j.stiffness != 0)) {
+      Json rsda{{"name", j.name + " spring"}, {"type", "rsda"}, {"joint", j.name}};
+      if (j.stiffness != 0) rsda["stiffness"] = j.stiffness;
+      if (j.damping != 0) rsda["damping"] = j.damping;
+      if (j.free_value != 0) rsda["free_angle"] = j.free_value;
+      forces_.push_back(rsda);
+    }
+    if (slides && j.stiffness != 0) add_spring(j, value, b1, b2, json);
+    if (j.coulomb != 0 || (slides && j.damping != 0))
       forces_.push_back({{"name", j.name + " friction"},
                          {"type", "friction"},
                          {"joint", j.name},
                          {"coulomb", j.coulomb},
                          {"viscous", slides ? j.damping : 0},
-                         {"smooth_velocity", smooth_velocity_}});
+                         {"smooth_velocity", kSmoothVelocity}});
+  }
+
+  std::string add_sensor(const std::string& wanted, const Json& sensor) {
+    const std::string name = sensor_names_.add(wanted);
+    sensors_[name] = sensor;
+    return name;
   }
 
   // Adds a torque -c (omega_2 - omega_1) on body 2 and its opposite on body 1. A bushing would resist the rate of the
@@ -118,84 +138,53 @@ class ProblemWriter {
     Json on_body2 = Json::array(), on_body1 = Json::array();
     for (const char* axis : {"x", "y", "z"}) {
       const auto rate = [&](const ImportedBody& b) {
-        const std::string name = sensor_names_.identifier(fmt::format("{}_{}_w{}", j.name, b.name, axis));
-        sensors_[name] = {{"quantity", "angular_velocity"}, {"body", b.name}, {"component", axis}};
-        return name;
+        return add_sensor(fmt::format("{}_{}_w{}", j.name, b.name, axis),
+                          {{"quantity", "angular_velocity"}, {"body", b.name}, {"component", axis}});
       };
       const std::string c = Expression(j.damping).text(), w2 = rate(b2);
       const std::string relative = j.body1 > 0 ? fmt::format("({} - {})", w2, rate(b1)) : w2;
       on_body2.push_back(fmt::format("-{}*{}", c, relative));
       on_body1.push_back(fmt::format("{}*{}", c, relative));
     }
-    const auto add_torque = [&](const char* end, const ImportedBody& b, const Json& components) {
+    const auto add_torque = [&](const char* reaction, const ImportedBody& b, const Json& components) {
       forces_.push_back(
-          {{"name", j.name + " damping" + end}, {"type", "torque"}, {"body", b.name}, {"components", components}});
+          {{"name", j.name + " damping" + reaction}, {"type", "torque"}, {"body", b.name}, {"components", components}});
     };
     add_torque("", b2, on_body2);
     if (j.body1 > 0) add_torque(" reaction", b1, on_body1);
   }
 
-  void add_rsda(const ImportedJoint& j) {
-    Json rsda{{"name", j.name + " spring"}, {"type", "rsda"}, {"joint", j.name}};
-    if (j.stiffness != 0) rsda["stiffness"] = j.stiffness;
-    if (j.damping != 0) rsda["damping"] = j.damping;
-    if (j.free_value != 0) rsda["free_angle"] = j.free_value;
-    forces_.push_back(rsda);
-  }
-
   // Adds k (x - x0) along the axis, which pulls the two bodies of a translational joint back.
-  void add_spring(const ImportedJoint& j, const ImportedBody& b1, const ImportedBody& b2, const Json& json) {
-    const std::string x = sensor_of_.at(j.name);
+  void add_spring(const ImportedJoint& j, const std::string& x, const ImportedBody& b1, const ImportedBody& b2,
+                  const Json& joint) {
     const std::string extension = j.free_value == 0 ? x : fmt::format("({} - {})", x, Expression(j.free_value).text());
-    const auto add_force = [&](const char* end, const ImportedBody& b, const Json& at, const Json& axis, double k) {
+    const auto add_force = [&](const char* reaction, const ImportedBody& b, const char* end, double k) {
       Json components = Json::array();
-      for (const double a : axis) {
-        if (a == 0)
-          components.push_back(0);
-        else
-          components.push_back(fmt::format("{}*{}", Expression(k * a).text(), extension));
-      }
-      forces_.push_back({{"name", j.name + " spring" + end},
+      for (const double a : joint[std::string("axis") + end])
+        components.push_back(a == 0 ? Json(0) : Json(fmt::format("{}*{}", Expression(k * a).text(), extension)));
+      forces_.push_back({{"name", j.name + " spring" + reaction},
                          {"type", "force"},
                          {"body", b.name},
-                         {"point", at},
+                         {"point", joint[std::string("point") + end]},
                          {"components", components},
                          {"frame", "body"}});
     };
-    add_force("", b2, json["point2"], json["axis2"], -j.stiffness);
-    if (j.body1 > 0) add_force(" reaction", b1, json["point1"], json["axis1"], j.stiffness);
-  }
-
-  void sensor_of(const ImportedJoint& j, const char* quantity) {
-    const std::string name = sensor_names_.identifier(j.name);
-    sensor_of_[j.name] = name;
-    sensors_[name] = {{"quantity", quantity}, {"joint", j.name}};
+    add_force("", b2, "2", -j.stiffness);
+    if (j.body1 > 0) add_force(" reaction", b1, "1", j.stiffness);
   }
 
   void add(const ImportedTie& t) {
-    const ImportedJoint* first = &model_.joints[static_cast<std::size_t>(t.joint1)];
-    const ImportedJoint* second = &model_.joints[static_cast<std::size_t>(t.joint2)];
-    double factor = t.factor;
-    const bool first_turns = first->type == "revolute", second_turns = second->type == "revolute";
-    if (!first_turns && second_turns) {  // a rack and pinion goes from the angle to the displacement
-      std::swap(first, second);
-      factor = 1 / factor;
-    }
-    const bool gear = first_turns && second_turns;
     joints_.push_back({{"name", t.name},
-                       {"type", gear ? "gear" : "rack_pinion"},
-                       {"joint1", first->name},
-                       {"joint2", second->name},
-                       {gear ? "ratio" : "radius", factor}});
+                       {"type", t.type},
+                       {"joint1", model_.joints[static_cast<std::size_t>(t.joint1)].name},
+                       {"joint2", model_.joints[static_cast<std::size_t>(t.joint2)].name},
+                       {t.type == "gear" ? "ratio" : "radius", t.factor}});
   }
 
-  const ImportedModel& model_;
-  double smooth_velocity_;
-  std::vector<std::string>& renamed_;
+  ImportedModel& model_;
   double reach_ = 0;  // the farthest place [m]
   Json joints_ = Json::array(), forces_ = Json::array(), sensors_ = Json::object();
-  Names sensor_names_{words(kReservedNames)};
-  std::map<std::string, std::string> sensor_of_;  // by joint
+  UniqueNames sensor_names_{UniqueNames::Kind::identifier, words(kReservedNames), nullptr};
 };
 
 std::string one_line(const Json& json) {
@@ -209,12 +198,8 @@ std::string one_line(const Json& json) {
 
 }  // namespace
 
-nlohmann::ordered_json problem_of(const ImportedModel& model, double smooth_velocity,
-                                  std::vector<std::string>& renamed) {
-  return ProblemWriter(model, smooth_velocity, renamed).problem();
-}
-
-std::string text_of(const nlohmann::ordered_json& problem) {
+std::string problem_text(ImportedModel& model) {
+  const Json problem = ProblemWriter(model).problem();
   std::string text;
   for (const auto& [key, value] : problem.items()) {
     text += fmt::format("{}  {}: ", text.empty() ? "" : ",\n", json_text(key));

@@ -1,12 +1,10 @@
-#include "app/import/urdf_model.hpp"
-
+// URDF, the robot description of ROS (https://wiki.ros.org/urdf/XML): links and joints that form a tree.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <map>
 #include <set>
 
-#include "app/import/model_reader.hpp"
+#include "app/import/geom.hpp"
+#include "app/import/model_builder.hpp"
 
 namespace mbsopt {
 namespace {
@@ -15,243 +13,192 @@ using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+// Units: m, rad, kg, N, s.
+// clang-format off
+const std::vector<ModelAttribute> kUrdf{
+    {"robot name", kWord, "robot"}, {"robot version", kWord, ""}, {"link name"}, {"joint name"}, {"joint type"},
+    {"parent link"}, {"child link"}, {"origin xyz", 3, "0 0 0"}, {"origin rpy", 3, "0 0 0"}, {"axis xyz", kNonzero + 3, "1 0 0"},
+    {"dynamics damping", 1, "0"}, {"dynamics friction", 1, "0"},
+    {"mimic joint"}, {"mimic multiplier", 1, "1"}, {"mimic offset", 1, "0"}, {"mass value", 1},
+    {"inertia ixx", 1}, {"inertia ixy", 1}, {"inertia ixz", 1}, {"inertia iyy", 1}, {"inertia iyz", 1}, {"inertia izz", 1},
+    {"box size", 3, "1 1 1"}, {"sphere radius", 1}, {"cylinder radius", 1}, {"cylinder length", 1},
+    {"limit", kActs}, {"collision", kActs}, {"contact", kActs}, {"safety_controller", kActs}};
+// clang-format on
+
 // Each type of URDF becomes one of the problem format. "" leaves the child free; "fixed" unites both bodies.
 const std::map<std::string, std::string> kUrdfTypes{
     {"revolute", "revolute"}, {"continuous", "revolute"}, {"prismatic", "translational"},
     {"planar", "planar"},     {"fixed", "fixed"},         {"floating", ""}};
 
-class UrdfReader {
+class UrdfReader : ModelBuilder {
  public:
-  UrdfReader(const XmlElement& robot, const std::string& file) : robot_(robot), errors_(file) {}
+  explicit UrdfReader(ModelFile& file) : ModelBuilder(file, kUrdf) {}
 
   ImportedModel read() {
-    model_.name = robot_.text("name").value_or("robot");
-    model_.bodies.push_back({.name = "ground"});
-    robot_.text("version");
-    for (const XmlElement* link : robot_.children("link")) index(*link, links_);
-    for (const XmlElement* joint : robot_.children("joint")) index_joint(*joint);
-    errors_.throw_if_any();
-    const XmlElement* const root = root_link();
-    errors_.throw_if_any();
-    // URDF does not define the support of its root. It is fixed here, as in MuJoCo.
-    fill(*root);
-    model_.changed.push_back(fmt::format("the root link '{}' is fixed to the ground", *root->text("name")));
-    for (const auto& [name, link] : links_) {
-      if (!placed_.contains(name)) errors_.add(*link, "is not reached from the root link: joints form a circle");
+    model_.name = root_.word("name");
+    root_.word("version");
+    for (const ModelElement& link : root_.children("link")) {
+      if (!links_.emplace(link.word("name"), link).second) name_is_taken(link);
     }
-    add_mimics();
-    errors_.throw_if_any();
-    return std::move(model_);
+    std::set<std::string> names;
+    for (const ModelElement& joint : root_.children("joint")) {
+      if (!names.insert(joint.word("name")).second) name_is_taken(joint);
+      index(joint);
+    }
+    file_.throw_if_any();
+    std::vector<ModelElement> roots;
+    for (const ModelElement& link : root_.children("link")) {
+      if (!carried_.contains(link.word("name"))) roots.push_back(link);
+    }
+    if (roots.empty()) root_.error("has no root: each link is the child of a joint, or there is no link");
+    for (std::size_t k = 1; k < roots.size(); ++k)
+      roots[k].error(fmt::format("is a second root; '{}' is no joint's child, either", roots[0].word("name")));
+    file_.throw_if_any();
+    // URDF does not define the support of its root. It is fixed here, as in MuJoCo.
+    fill(roots[0]);
+    model_.changed.push_back(fmt::format("the root link '{}' is fixed to the ground", roots[0].word("name")));
+    for (const auto& [name, link] : links_) {
+      if (!placed_.contains(name)) link.error("is not reached from the root link: joints form a circle");
+    }
+    for (const ModelElement& joint : root_.children("joint")) {
+      if (const ModelElement mimic = joint.child("mimic")) add_mimic(joint.word("name"), mimic);
+    }
+    return finished();
   }
 
  private:
-  using Elements = std::map<std::string, const XmlElement*>;
+  static void name_is_taken(const ModelElement& element) { element.error("the name is taken by an element before it"); }
 
-  std::string required(const XmlElement& element, const char* attribute) {
-    const std::optional<std::string> text = element.text(attribute);
-    if (!text || text->empty()) errors_.add(element, fmt::format("has no attribute '{}'", attribute));
-    return text.value_or("");
-  }
-
-  void index(const XmlElement& element, Elements& elements) {
-    if (!elements.emplace(required(element, "name"), &element).second)
-      errors_.add(element, "the name is taken by an element before it");
-  }
-
-  void index_joint(const XmlElement& joint) {
-    index(joint, joints_);
-    const std::string type = required(joint, "type");
+  void index(const ModelElement& joint) {
+    const std::string type = joint.word("type");
     if (!type.empty() && !kUrdfTypes.contains(type))
-      errors_.add(joint, fmt::format("the type is '{}'; available: revolute, continuous, prismatic, planar, fixed, "
-                                     "floating",
-                                     type));
-    const std::string parent = linked(joint, "parent"), child = linked(joint, "child");
-    children_[parent].push_back(&joint);
-    if (!child.empty() && !parents_.emplace(child, &joint).second)
-      errors_.add(joint, fmt::format("the link '{}' is the child of a joint before it", child));
+      joint.error(
+          fmt::format("the type is '{}'; available: revolute, continuous, prismatic, planar, fixed, floating", type));
+    children_[link_of(joint, "parent")].push_back(joint);
+    const std::string child = link_of(joint, "child");
+    if (!child.empty() && !carried_.insert(child).second)
+      joint.error(fmt::format("the link '{}' is the child of a joint before it", child));
   }
 
-  std::string linked(const XmlElement& joint, const char* end) {
-    const XmlElement* const element = joint.child(end);
-    if (!element) {
-      errors_.add(joint, fmt::format("has no <{}>", end));
-      return "";
-    }
-    const std::string name = required(*element, "link");
-    if (!name.empty() && !links_.contains(name)) errors_.add(*element, fmt::format("there is no link '{}'", name));
-    return name;
-  }
-
-  const XmlElement* root_link() {
-    const XmlElement* root = nullptr;
-    for (const XmlElement* link : robot_.children("link")) {
-      if (parents_.contains(*link->text("name"))) continue;
-      if (root)
-        errors_.add(*link, fmt::format("is a second root; '{}' is no joint's child, either", *root->text("name")));
-      else
-        root = link;
-    }
-    if (!root) errors_.add(robot_, "has no root: each link is the child of a joint, or there is no link");
-    return root;
-  }
-
-  Vector3d vector(const XmlElement& element, const char* attribute, const Vector3d& otherwise) {
-    const std::optional<std::string> text = element.text(attribute);
-    return text ? Vector3d(numbers(element, attribute, *text, 3, errors_)) : otherwise;
-  }
-  double number(const XmlElement& element, const char* attribute, double otherwise) {
-    const std::optional<std::string> text = element.text(attribute);
-    return text ? numbers(element, attribute, *text, 1, errors_)(0) : otherwise;
-  }
-  double required_number(const XmlElement& element, const char* attribute) {
-    const std::string text = required(element, attribute);
-    return text.empty() ? 0 : numbers(element, attribute, text, 1, errors_)(0);
+  std::string link_of(const ModelElement& joint, const char* end) {
+    const ModelElement element = joint.child(end);
+    if (!element) joint.error(fmt::format("has no <{}>", end));
+    const std::string link = element ? element.word("link") : "";
+    if (!link.empty() && !links_.contains(link)) element.error(fmt::format("there is no link '{}'", link));
+    return link;
   }
 
   // rpy turns about the fixed axes x, y, z, in this order.
-  Isometry3d origin(const XmlElement& element) {
+  static Isometry3d origin(const ModelElement& element) {
     Isometry3d frame = Isometry3d::Identity();
-    const XmlElement* const o = element.child("origin");
-    if (!o) return frame;
-    const Vector3d rpy = vector(*o, "rpy", Vector3d::Zero());
-    frame.linear() = rotation(2, rpy(2)) * rotation(1, rpy(1)) * rotation(0, rpy(0));
-    frame.translation() = vector(*o, "xyz", Vector3d::Zero());
+    if (const ModelElement o = element.child("origin")) {
+      const Vector3d rpy = o.numbers("rpy");
+      frame.linear() = rotation(2, rpy(2)) * rotation(1, rpy(1)) * rotation(0, rpy(0));
+      frame.translation() = o.numbers("xyz");
+    }
     return frame;
   }
 
   // Adds each link to its body, from the root on. The tree may have any depth, so this is no recursion over links.
-  void fill(const XmlElement& root) {
+  void fill(const ModelElement& root) {
     struct Waiting {
-      const XmlElement* link;
+      ModelElement link;
       int body;
       Isometry3d frame;  // of the link, in that of its body
     };
-    std::vector<Waiting> waiting{{&root, 0, Isometry3d::Identity()}};
+    std::vector<Waiting> waiting{{root, 0, Isometry3d::Identity()}};
     while (!waiting.empty()) {
       const Waiting now = waiting.back();
       waiting.pop_back();
-      const std::string name = *now.link->text("name");
+      const std::string name = now.link.word("name");
       placed_.insert(name);
-      add_link(*now.link, model_.bodies[static_cast<std::size_t>(now.body)], now.frame);
+      add_link(now.link, now.body, now.frame);
       std::vector<Waiting> found;
-      for (const XmlElement* joint : children_[name]) {
-        const XmlElement& child = *links_.at(*joint->child("child")->text("link"));
-        const Isometry3d frame = now.frame * origin(*joint);
-        const int body = body_of(*joint, child, now.body, frame);
-        found.push_back({&child, body, body == now.body ? frame : Isometry3d::Identity()});
+      for (const ModelElement& joint : children_[name]) {
+        const ModelElement& child = links_.at(joint.child("child").word("link"));
+        const Isometry3d frame = now.frame * origin(joint);
+        const int body = body_of(joint, child, now.body, frame);
+        found.push_back({child, body, body == now.body ? frame : Isometry3d::Identity()});
       }
       waiting.insert(waiting.end(), found.rbegin(), found.rend());  // in the order of the file
     }
   }
 
   // between is the frame of the child link in that of the parent's body.
-  int body_of(const XmlElement& element, const XmlElement& child, int parent, const Isometry3d& between) {
-    const std::string type = kUrdfTypes.at(*element.text("type"));
+  int body_of(const ModelElement& element, const ModelElement& child, int parent, const Isometry3d& between) {
+    const std::string given = element.word("type"), type = kUrdfTypes.at(given);
     if (type == "fixed") {
-      if (parent > 0) {
-        const ImportedBody& carrier = model_.bodies[static_cast<std::size_t>(parent)];
-        model_.changed.push_back(fmt::format("link '{}' is a part of '{}'", *child.text("name"), carrier.name));
-      }
+      if (parent > 0)
+        model_.changed.push_back(fmt::format("link '{}' is a part of '{}'", child.word("name"), body(parent).name));
       return parent;
     }
-    const int body = static_cast<int>(model_.bodies.size());
-    const Isometry3d frame = model_.bodies[static_cast<std::size_t>(parent)].frame * between;
-    model_.bodies.push_back({.name = body_names_.body(*child.text("name")), .frame = frame, .source = &child});
-    const XmlElement* const dynamics = element.child("dynamics");
-    if (dynamics && (type.empty() || type == "planar")) leave_out(*dynamics, *element.text("type"));
-    if (type.empty()) return body;
-    ImportedJoint joint{.name = joint_names_.body(*element.text("name")), .type = type, .body1 = parent, .body2 = body};
-    joint.source = &element;
-    joint.between = between;
-    Vector3d axis = Vector3d::UnitX();
-    if (const XmlElement* const a = element.child("axis")) axis = vector(*a, "xyz", axis);
-    if (axis.norm() == 0) errors_.add(element, "the axis is zero");
-    joint.axis = axis.normalized();
-    if (dynamics && type != "planar") {
-      joint.damping = number(*dynamics, "damping", 0);
-      joint.coulomb = number(*dynamics, "friction", 0);
+    ImportedJoint joint{.type = type, .body1 = parent, .body2 = 0, .between = between};
+    joint.body2 = add_body(child.word("name"), parent, between, child);
+    const ModelElement dynamics = element.child("dynamics");
+    if (dynamics) {
+      joint.damping = dynamics.number("damping");
+      joint.coulomb = dynamics.number("friction");
     }
-    joint_index_[*element.text("name")] = static_cast<int>(model_.joints.size());
-    model_.joints.push_back(joint);
-    return body;
+    if (!type.empty()) {
+      const ModelElement axis = element.child("axis");
+      joint.axis = axis ? Vector3d(axis.numbers("xyz")) : Vector3d::UnitX();
+    }
+    add_joint(element.word("name"), joint, element, dynamics, given);
+    return joint.body2;
   }
 
-  void leave_out(const XmlElement& dynamics, const std::string& type) {
-    for (const char* attribute : {"damping", "friction"}) {
-      const double value = number(dynamics, attribute, 0);
-      if (value != 0)
-        model_.changed.push_back(left_out(dynamics, fmt::format("{} {} of a {} joint", attribute, value, type)));
+  void add_link(const ModelElement& link, int index, const Isometry3d& frame) {
+    ImportedBody& carrier = body(index);
+    if (index > 0 && carrier.place != link.place()) carrier.points.emplace_back(link.word("name"), frame.translation());
+    if (const ModelElement inertial = link.child("inertial")) {
+      const ModelElement mass = inertial.child("mass"), inertia = inertial.child("inertia");
+      if (mass && inertia)
+        add_inertial(link, carrier, mass.number("value"), inertia, frame * origin(inertial));
+      else
+        inertial.error(mass ? "has no <inertia>" : "has no <mass>");
     }
-  }
-
-  void add_link(const XmlElement& link, ImportedBody& body, const Isometry3d& frame) {
-    if (body.source && body.source != &link) body.points.emplace_back(*link.text("name"), frame.translation());
-    if (const XmlElement* const inertial = link.child("inertial")) add_inertial(link, *inertial, body, frame);
-    for (const XmlElement* visual : link.children("visual")) {
-      const XmlElement* const geometry = visual->child("geometry");
-      if (geometry) add_shape(*geometry, body, frame * origin(*visual));
+    for (const ModelElement& visual : link.children("visual")) {
+      if (const ModelElement geometry = visual.child("geometry")) add_shape(geometry, carrier, frame * origin(visual));
     }
   }
 
-  void add_inertial(const XmlElement& link, const XmlElement& inertial, ImportedBody& body, const Isometry3d& frame) {
-    const Isometry3d at = frame * origin(inertial);
-    const XmlElement* const mass = inertial.child("mass");
-    const XmlElement* const inertia = inertial.child("inertia");
-    if (!mass) return errors_.add(inertial, "has no <mass>");
-    if (!inertia) return errors_.add(inertial, "has no <inertia>");
-    const auto J = [&](const char* entry) { return required_number(*inertia, entry); };
+  void add_inertial(const ModelElement& link, ImportedBody& carrier, double mass, const ModelElement& inertia,
+                    const Isometry3d& at) {
+    const auto J = [&](const char* entry) { return inertia.number(entry); };
     Matrix3d tensor;
     tensor << J("ixx"), J("ixy"), J("ixz"), J("ixy"), J("iyy"), J("iyz"), J("ixz"), J("iyz"), J("izz");
-    add_part(body, link, required_number(*mass, "value"), at.translation(),
-             at.linear() * tensor * at.linear().transpose(), errors_);
+    add_part(carrier, mass, at.translation(), at.linear() * tensor * at.linear().transpose(), link);
   }
 
-  void add_shape(const XmlElement& geometry, ImportedBody& body, const Isometry3d& at) {
-    if (const XmlElement* const box = geometry.child("box")) {
-      body.shapes.push_back(box_shape(vector(*box, "size", Vector3d::Ones()) / 2, at));
-    } else if (const XmlElement* const sphere = geometry.child("sphere")) {
-      body.shapes.push_back({"sphere", at.translation(), at.translation(), required_number(*sphere, "radius")});
-    } else if (const XmlElement* const cylinder = geometry.child("cylinder")) {
-      const Vector3d half(0, 0, required_number(*cylinder, "length") / 2);
-      body.shapes.push_back({"cylinder", at * Vector3d(-half), at * half, required_number(*cylinder, "radius")});
-    }
+  static void add_shape(const ModelElement& geometry, ImportedBody& carrier, const Isometry3d& at) {
+    if (const ModelElement box = geometry.child("box"))
+      carrier.shapes.push_back(shape_of({"box", box.numbers("size") / 2, at}));
+    else if (const ModelElement sphere = geometry.child("sphere"))
+      carrier.shapes.push_back(shape_of({"sphere", {sphere.number("radius"), 0, 0}, at}));
+    else if (const ModelElement cylinder = geometry.child("cylinder"))
+      carrier.shapes.push_back(
+          shape_of({"cylinder", {cylinder.number("radius"), cylinder.number("length") / 2, 0}, at}));
   }
 
   // <mimic>: value = multiplier value(other) + offset.
-  void add_mimics() {
-    for (const XmlElement* element : robot_.children("joint")) {
-      const XmlElement* const mimic = element->child("mimic");
-      if (!mimic) continue;
-      const auto own = joint_index_.find(*element->text("name"));
-      const auto other = joint_index_.find(required(*mimic, "joint"));
-      if (other == joint_index_.end() || own == joint_index_.end()) {
-        errors_.add(*mimic, "ties no two joints that move");
-        continue;
-      }
-      if (number(*mimic, "offset", 0) != 0)
-        model_.changed.push_back(
-            fmt::format("line {}: mimic has no offset: both joints count from where the file draws them", mimic->line));
-      model_.ties.push_back({.name = joint_names_.body(own->first + " mimics " + other->first),
-                             .joint1 = other->second,
-                             .joint2 = own->second,
-                             .factor = number(*mimic, "multiplier", 1),
-                             .source = mimic});
-    }
+  void add_mimic(const std::string& joint, const ModelElement& mimic) {
+    const std::string other = mimic.word("joint");
+    if (!joint_index_.contains(joint) || !joint_index_.contains(other))
+      return mimic.error("ties no two joints that move");
+    if (mimic.number("offset") != 0)
+      model_.changed.push_back(fmt::format(
+          "line {}: mimic has no offset: both joints count from where the file draws them", mimic.place().line));
+    add_tie(joint, " mimics ", other, mimic.number("multiplier"), mimic);
   }
 
-  const XmlElement& robot_;
-  ModelErrors errors_;
-  ImportedModel model_;
-  Names body_names_{{"ground"}, &model_.changed}, joint_names_{{}, &model_.changed};
-  Elements links_, joints_;
-  std::map<std::string, std::vector<const XmlElement*>> children_;  // joints of a link
-  Elements parents_;                                                // the joint that carries a link
-  std::map<std::string, int> joint_index_;
+  std::map<std::string, ModelElement> links_;
+  std::map<std::string, std::vector<ModelElement>> children_;  // joints of a link
+  std::set<std::string> carried_;                              // links that a joint carries
   std::set<std::string> placed_;
 };
 
 }  // namespace
 
-ImportedModel urdf_model(const XmlElement& robot, const std::string& file) { return UrdfReader(robot, file).read(); }
+ImportedModel urdf_model(ModelFile& file) { return UrdfReader(file).read(); }
 
 }  // namespace mbsopt

@@ -317,6 +317,15 @@ TEST_CASE("an orientation of an MJCF element goes before that of its class", "[i
              Contains("geom: pos: must not be given with fromto"));
 }
 
+TEST_CASE("a default class that is named as the one around it belongs to it", "[import]") {
+  const auto model = [](const std::string& defaults) {
+    return imported_text("<mujoco><default><geom type='box'/>" + defaults + "</default><worldbody><body><joint/>" +
+                         "<geom class='main'/></body></worldbody></mujoco>")
+        .text;
+  };
+  CHECK(model("<default class='main'><geom size='1 1 1'/></default>") == model("<geom size='1 1 1'/>"));
+}
+
 TEST_CASE("words of MuJoCo's options are those that it takes", "[import]") {
   const auto model = [](const std::string& settings, const std::string& weld = "") {
     return "<mujoco>" + settings + "<worldbody><body name='a'><joint/><geom size='0.1'/></body></worldbody><equality>" +
