@@ -1,5 +1,5 @@
-// Turns JSON text (comments allowed) into nodes with positions. nlohmann's parser decides what is JSON. It does not
-// keep positions, so a scan of the tokens finds where each one begins.
+// Turns JSON text (comments allowed) into nodes with positions. nlohmann's parser keeps no positions, so it reads
+// single strings, numbers and literals only.
 #pragma once
 
 #include "app/json/findings.hpp"
