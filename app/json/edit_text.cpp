@@ -37,14 +37,10 @@ std::string with_value(const std::string& text, std::string_view path, const std
 
   const Node* node = &root;
   std::size_t depth = 0;
-  while (depth < steps.size()) {
-    const PathStep& step = steps[depth];
-    const bool inside_list = step.is_index && node->kind == Node::Kind::array && step.index < node->items.size();
-    const bool inside_object = !step.is_index && node->kind == Node::Kind::object;
-    const Node* const next = inside_list ? &node->items[step.index] : (inside_object ? node->find(step.key) : nullptr);
+  for (; depth < steps.size(); ++depth) {
+    const Node* const next = node->at(steps[depth]);
     if (!next) break;
     node = next;
-    ++depth;
   }
   if (depth == steps.size()) return replaced(text, node->begin, node->end, json);
 

@@ -14,6 +14,11 @@ const Node* Node::find(std::string_view key) const {
   return nullptr;
 }
 
+const Node* Node::at(const PathStep& step) const {
+  if (!step.is_index) return find(step.key);
+  return kind == Kind::array && step.index < items.size() ? &items[step.index] : nullptr;
+}
+
 std::string what_is(const Node& node) {
   constexpr std::size_t kShown = 40;
   switch (node.kind) {
@@ -82,11 +87,7 @@ const Node& nearest(const Node& root, std::string_view path) {
   const Node* node = &root;
   if (path.empty()) return root;
   for (const PathStep& step : parse_path(path)) {
-    const Node* next = nullptr;
-    if (step.is_index && node->kind == Node::Kind::array && step.index < node->items.size())
-      next = &node->items[step.index];
-    else if (!step.is_index && node->kind == Node::Kind::object)
-      next = node->find(step.key);
+    const Node* const next = node->at(step);
     if (!next) break;
     node = next;
   }

@@ -10,6 +10,13 @@
 
 namespace mbsopt {
 
+// A JSON path (core/scene/scene_path.hpp), step by step.
+struct PathStep {
+  std::string key;  // of an object
+  bool is_index = false;
+  std::size_t index = 0;
+};
+
 struct Node {
   enum class Kind { null, boolean, number, string, array, object };
   Kind kind = Kind::null;
@@ -23,17 +30,12 @@ struct Node {
   int source = 0;                  // 0: the problem file, k: the k-th --set
 
   const Node* find(std::string_view key) const;  // of an object; nullptr when there is none
+  const Node* at(const PathStep& step) const;    // of an object or a list; nullptr when there is none
 };
 
 // "an object", "a list of 2", "the number 3", "the string 'x'", ...
 std::string what_is(const Node& node);
 
-// A JSON path (core/scene/scene_path.hpp), step by step.
-struct PathStep {
-  std::string key;  // of an object
-  bool is_index = false;
-  std::size_t index = 0;
-};
 // Throws std::invalid_argument if the text is not a path.
 std::vector<PathStep> parse_path(std::string_view path);
 
