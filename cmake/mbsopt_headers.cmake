@@ -11,7 +11,7 @@ set(public
   optim/problem/problem.hpp optim/problem/csv_table.hpp optim/problem/parameter_values.hpp
   optim/objective/objective.hpp optim/objective/evaluator.hpp optim/objective/hessian.hpp
   optim/design/design.hpp optim/fit/identification.hpp optim/check/gradient_check.hpp
-  optim/tradeoff/tradeoff.hpp optim/tradeoff/accuracy.hpp
+  optim/tradeoff/tradeoff.hpp optim/tradeoff/advice.hpp optim/tradeoff/accuracy.hpp
   optim/solver/nonlinear_program.hpp optim/solver/ipopt_solver.hpp optim/solver/nlopt_solver.hpp
   optim/problem/named_terms.hpp app/json/read_problem.hpp app/program.hpp)
 # Public, but not in mbsopt.hpp, which would take longer to compile.

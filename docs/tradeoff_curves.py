@@ -1,5 +1,5 @@
-"""Work-precision curves of a sweep, as optim/tradeoff/tradeoff_curves sees them: lines, whether they are monotone, where an
-error rises along one, and why."""
+"""Work-precision curves of a sweep, as optim/tradeoff/tradeoff_table sees them: lines, whether they are monotone, where
+an error rises along one, and why."""
 
 import math
 import textwrap

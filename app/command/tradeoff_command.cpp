@@ -11,59 +11,51 @@
 #include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "core/scene/default_integrator.hpp"
 #include "optim/fit/windows.hpp"
-#include "optim/tradeoff/fit_errors.hpp"
 
 namespace mbsopt {
 namespace {
 
-constexpr const char* kNothingMeasured = "nothing was measured yet";
-constexpr const char* kMeasuredIsKept = "tradeoff.csv holds what was measured";
-
-constexpr double kFits = 0.2;  // of the budget, for the sums of squares at settings that may be advised
-
-void apply_accuracy(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser, double accuracy) {
-  const TaskAdvice advice = adviser.at(accuracy);
-  add_applied(run, tradeoff, advice);
-  if (const auto row = advice.recommendation.row)
-    run.write("recommended.json", recommended_problem_text(run, tradeoff.rows[*row].setting.simulation));
-}
-
-// The sum of squares of `identify` is not an objective of the file; the integrator limits its accuracy.
-void add_fit(Run& run, const FitErrorMeasure& fit) {
-  const SimulationSettings& own = run.problem.scene.simulation;
-  SimulationSettings defaults = own;
-  defaults.formulation = {}, defaults.integrator = default_integrator(own.start_time, own.end_time);
-  FitErrors errors = fit.found();
-  if (errors.ok()) errors.settings = {fit.at({"own", own}), fit.at({"defaults", defaults})};
-  add_fit_errors(run, errors);
-}
-
-void sweep(Run& run) {
+TradeoffOptions options_of(Run& run) {
   TradeoffOptions options;
   options.budget_seconds = run.context.options.budget;
   options.interrupted = [] { return interrupted(); };
   options.progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); };
-  Tradeoff tradeoff = measure_tradeoff(run.problem.scene, objectives_of(run.problem), options);
+  return options;
+}
+
+// Adds the reference and the table, or why there is none. Returns whether there is one.
+template <class Study>
+bool add_table(Run& run, const Tradeoff& table, const Study& study) {
   run.progress.finish();
-  if (!tradeoff.ok()) {
-    tradeoff.interrupted ? run.stopped("there was no reference yet, nothing is kept") : run.failed(tradeoff.message);
-    return;
+  if (!table.ok()) {
+    table.interrupted ? run.stopped("there was no reference yet, nothing is kept") : run.failed(table.message);
+    return false;
   }
-  add_reference(run, tradeoff.reference);
-  if (!tradeoff.rows.empty()) run.write("tradeoff.csv", to_csv(tradeoff));
-  add_given_settings(run, tradeoff);
+  add_reference(run, table.reference);
+  if (!table.rows.empty()) run.write("tradeoff.csv", to_csv(study));
+  return true;
+}
+
+void stopped(Run& run, const Tradeoff& table) {
+  run.stopped(table.rows.empty() ? "nothing was measured yet" : "tradeoff.csv holds what was measured");
+}
+
+void sweep(Run& run) {
+  constexpr double kFits = 0.2;  // of the budget, for the sums of squares at settings that may be advised
+  const TradeoffOptions options = options_of(run);
   const Problem& problem = run.problem;
+  Tradeoff tradeoff = measure_tradeoff(problem.scene, objectives_of(problem), options);
+  if (!add_table(run, tradeoff, tradeoff)) return;
+  add_given_settings(run, tradeoff);
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
   const CutProblem cut = cut_into_windows(problem, data, {}, [](double) { return !interrupted(); });
   for (const std::string& warning : cut.warnings) run.warn(warning);
   tradeoff.interrupted = tradeoff.interrupted || interrupted();
-  std::optional<FitErrorMeasure> fit;
-  if (problem.identification && !tradeoff.interrupted) {
-    fit.emplace(cut.problem, cut.data, [] { return interrupted(); });
-    add_fit(run, *fit);
-  }
+  // The sum of squares of `identify` is not an objective of the file; the integrator limits its accuracy.
+  std::optional<FitErrors> fit;
+  if (problem.identification && !tradeoff.interrupted)
+    add_fit_errors(run, fit.emplace(cut.problem, cut.data, options.interrupted));
   TaskAdviser adviser(problem, tradeoff, fit ? &*fit : nullptr, kFits * options.budget_seconds);
   if (options.budget_seconds > 0) {
     add_recommendations(run, tradeoff);
@@ -71,29 +63,22 @@ void sweep(Run& run) {
     add_outcomes(run, tradeoff);
   }
   if (tradeoff.interrupted) {
-    run.stopped(tradeoff.rows.empty() ? kNothingMeasured : kMeasuredIsKept);
+    stopped(run, tradeoff);
   } else if (run.context.options.apply) {
-    apply_accuracy(run, tradeoff, adviser, *run.context.options.apply);
+    const Recommendation advice = adviser.at(*run.context.options.apply);
+    add_applied(run, tradeoff, advice, adviser.fit());
+    if (advice.row)
+      run.write("recommended.json", recommended_problem_text(run, tradeoff.rows[*advice.row].setting.simulation));
   }
-  run.write("report.html", tradeoff_report(run.result, tradeoff, objective_units(run.problem)));
+  run.write("report.html", tradeoff_report(run.result, tradeoff, objective_units(problem)));
 }
 
 void penalty_study(Run& run) {
-  PenaltyStudyOptions options;
-  options.alphas = alphas_of(run.context.options.alpha);
-  options.budget_seconds = run.context.options.budget;
-  options.interrupted = [] { return interrupted(); };
-  options.progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); };
-  const PenaltyStudy study = study_penalty(run.problem.scene, objectives_of(run.problem), options);
-  run.progress.finish();
-  if (!study.ok()) {
-    study.interrupted ? run.stopped("there was no reference yet, nothing is kept") : run.failed(study.message);
-    return;
-  }
-  add_reference(run, study.reference);
-  if (!study.rows.empty()) run.write("tradeoff.csv", to_csv(study));
-  add_penalty_study(run, study);
-  if (study.interrupted) run.stopped(study.rows.empty() ? kNothingMeasured : kMeasuredIsKept);
+  const PenaltyStudy study = study_penalty(run.problem.scene, objectives_of(run.problem),
+                                           alphas_of(run.context.options.alpha), options_of(run));
+  if (!add_table(run, study.table, study)) return;
+  if (!study.table.rows.empty()) add_penalty_study(run, study);
+  if (study.table.interrupted) stopped(run, study.table);
   run.write("report.html", penalty_report(run.result, study));
 }
 

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <functional>
+#include <optional>
 #include <utility>
 
 #include "app/report/line_plot.hpp"
@@ -13,7 +14,7 @@
 #include "app/results/tradeoff_results.hpp"
 #include "app/run/machine.hpp"
 #include "core/tableau/tableaus.hpp"
-#include "optim/tradeoff/tradeoff_curves.hpp"
+#include "optim/tradeoff/tradeoff_table.hpp"
 
 namespace mbsopt {
 namespace {
@@ -44,6 +45,12 @@ Group group_of(const TradeoffSetting& setting) {
 
 constexpr std::size_t kInk = 7;  // the colour of the style that is grey
 
+// The row of the file's own settings that holds a quantity, if it was measured.
+std::optional<std::size_t> own_row(const Tradeoff& tradeoff, const Quantity& q) {
+  const std::optional<std::size_t> own = q.kind == QuantityKind::gradient ? tradeoff.own_gradient : tradeoff.own;
+  return own && tradeoff.rows[*own].ok() ? own : std::nullopt;
+}
+
 std::string unit_of_error(const Quantity& q, const ObjectiveUnits& units) {
   if (q.relative) return "-";
   return q.kind == QuantityKind::objective ? shown_unit(units, q.objective_name) : kUnknownUnit;
@@ -52,50 +59,43 @@ std::string unit_of_error(const Quantity& q, const ObjectiveUnits& units) {
 // Draws lines through bounds. It draws points for errors below their bound, and for settings that a tighter one
 // dominates.
 LinePlot work_precision(const Tradeoff& tradeoff, const ObjectiveUnits& units, std::size_t quantity, Group group,
-                        const std::string& title) {
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
-  const Quantity& q = quantities[quantity];
+                        const char* methods) {
+  const std::vector<TradeoffRow>& rows = tradeoff.rows;
+  const Quantity& q = tradeoff.quantities()[quantity];
   const auto column = static_cast<Eigen::Index>(quantity);
-  LinePlot plot{.title = title,
+  LinePlot plot{.title = q.name + ": " + methods,
                 .x_label = "time [s]",
                 .y_label = fmt::format("{} error of {} [{}]", q.relative ? "relative" : "absolute", q.name,
                                        unit_of_error(q, units)),
                 .logarithmic_y = true,
                 .logarithmic_x = true};
-  std::vector<PlotSeries> points;
-  const auto add = [&](PlotSeries& series, const TradeoffRow& row, const Eigen::VectorXd& errors) {
-    series.x.push_back(row.wall_seconds), series.y.push_back(errors(column));
+  const auto add = [&](PlotSeries& series, std::size_t row, Eigen::VectorXd TradeoffRow::*errors) {
+    series.x.push_back(rows[row].wall_seconds), series.y.push_back((rows[row].*errors)(column));
   };
-  for (const WorkPrecisionCurve& curve : work_precision_curves(tradeoff.rows, quantities, quantity)) {
-    if (group_of(tradeoff.rows[curve.line.front()].setting) != group) continue;
+  std::vector<PlotSeries> points;
+  for (const WorkPrecisionCurve& curve : work_precision_curves(rows, tradeoff.quantities(), quantity)) {
+    if (group_of(rows[curve.line.front()].setting) != group) continue;
     PlotSeries off_line{"", {}, {}, Mark::points, plot.series.size()};
     PlotSeries& line = plot.series.emplace_back(PlotSeries{curve.name, {}, {}, Mark::line});
-    const std::vector<std::size_t> connected = slower_and_slower(tradeoff.rows, curve.line);
-    for (const std::size_t i : connected) add(line, tradeoff.rows[i], tradeoff.rows[i].bounds);
-    if (connected.size() == 1) add(off_line, tradeoff.rows[connected.front()], tradeoff.rows[connected.front()].bounds);
-    for (const std::vector<std::size_t>* some : {&curve.line, &curve.beside}) {
-      for (const std::size_t i : *some) {
-        const TradeoffRow& row = tradeoff.rows[i];
-        const bool on_line = std::binary_search(connected.begin(), connected.end(), i);
-        if (!on_line || row.errors(column) < row.bounds(column)) add(off_line, row, row.errors);
-      }
-    }
+    const std::vector<std::size_t> connected = slower_and_slower(rows, curve.line);
+    for (const std::size_t i : connected) add(line, i, &TradeoffRow::bounds);
+    if (connected.size() == 1) add(off_line, connected.front(), &TradeoffRow::bounds);
+    for (const std::vector<std::size_t>* some : {&curve.line, &curve.beside})
+      for (const std::size_t i : *some)
+        if (!std::ranges::binary_search(connected, i) || rows[i].errors(column) < rows[i].bounds(column))
+          add(off_line, i, &TradeoffRow::errors);
     if (!off_line.x.empty()) points.push_back(std::move(off_line));
   }
   if (plot.series.empty()) return plot;
   plot.series.insert(plot.series.end(), points.begin(), points.end());
   PlotSeries front{"Pareto front", {}, {}, Mark::rings};
-  for (const TradeoffRow& row : tradeoff.rows) {
-    if (group_of(row.setting) == group && row.pareto[quantity] && better_than_zero(q, row.bounds(column)))
-      add(front, row, row.bounds);
-  }
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (group_of(rows[i].setting) == group && rows[i].pareto[quantity] && better_than_zero(q, rows[i].bounds(column)))
+      add(front, i, &TradeoffRow::bounds);
   if (!front.x.empty()) plot.series.push_back(std::move(front));
-  const std::optional<std::size_t> own = group == Group::gradients ? tradeoff.own_gradient : tradeoff.own;
-  if (own && tradeoff.rows[*own].status == RowStatus::ok) {
-    PlotSeries& file = plot.series.emplace_back(PlotSeries{"as in the file", {}, {}, Mark::crosses});
-    file.colour = kInk;
-    add(file, tradeoff.rows[*own], tradeoff.rows[*own].errors);
-  }
+  if (const auto own = own_row(tradeoff, q))
+    add(plot.series.emplace_back(PlotSeries{"as in the file", {}, {}, Mark::crosses, {}, kInk}), *own,
+        &TradeoffRow::errors);
   return plot;
 }
 
@@ -109,55 +109,36 @@ constexpr const char* kHowToRead =
 // "The fastest setting for 1e-06 in track: dopri5 at rtol 1e-05, 12 ms (error 3e-07); as in the file: 1.2e-04 in 8 ms."
 std::string sentence_of(const Json& result, const Tradeoff& tradeoff, std::size_t quantity) {
   constexpr double kWanted = 1e-6;  // accuracy that suits most tasks; else the tightest that some setting has
-  const Quantity& q = tradeoff.reference.errors->quantities()[quantity];
+  const Quantity& q = tradeoff.quantities()[quantity];
   std::string words = fmt::format("{}: no setting was exact enough to be advised", q.name);
   for (const Json& r : result.value("recommendations", Json::array()))
     if (r.value("quantity", "") == q.name && r.contains("setting") && r.at("accuracy").get<double>() >= 0.99 * kWanted)
       words = "The fastest setting " + r.at("in_words").get<std::string>();
-  const bool of_gradient = q.kind == QuantityKind::gradient;
-  if (const auto own = of_gradient ? tradeoff.own_gradient : tradeoff.own) {
-    const TradeoffRow& row = tradeoff.rows[*own];
-    if (row.status == RowStatus::ok)
-      words += fmt::format("; as in the file: error {} in {}",
-                           error_text(row.errors(static_cast<Eigen::Index>(quantity)), q.certificate),
-                           duration_text(row.wall_seconds));
-  }
+  if (const auto own = own_row(tradeoff, q))
+    words += fmt::format("; as in the file: error {} in {}",
+                         error_text(tradeoff.rows[*own].errors(static_cast<Eigen::Index>(quantity)), q.certificate),
+                         duration_text(tradeoff.rows[*own].wall_seconds));
   return words + ".";
 }
 
 void add_plots(HtmlPage& page, const Json& result, const Tradeoff& tradeoff, const ObjectiveUnits& units) {
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
-  struct Titled {
-    Group group;
-    const char* title;
-  };
-  constexpr std::array kPlots{Titled{Group::explicit_methods, "explicit methods"},
-                              Titled{Group::implicit_methods, "implicit and multistep methods"},
-                              Titled{Group::formulations, "formulations"},
-                              Titled{Group::gradients, "gradient methods"}};
-  struct Chosen {
-    std::size_t quantity;
-    const char* methods;
-    LinePlot plot;
-  };
-  std::vector<Chosen> choices;
-  for (std::size_t q = 0; q < quantities.size(); ++q) {
-    for (const Titled& p : kPlots) {
-      LinePlot plot = work_precision(tradeoff, units, q, p.group, quantities[q].name + ": " + p.title);
-      if (!plot.series.empty()) choices.push_back({q, p.title, std::move(plot)});
+  constexpr std::array kPlots{std::pair{Group::explicit_methods, "explicit methods"},
+                              std::pair{Group::implicit_methods, "implicit and multistep methods"},
+                              std::pair{Group::formulations, "formulations"},
+                              std::pair{Group::gradients, "gradient methods"}};
+  bool any = false;
+  for (std::size_t q = 0; q < tradeoff.quantities().size(); ++q) {
+    for (const auto& [group, methods] : kPlots) {
+      const LinePlot plot = work_precision(tradeoff, units, q, group, methods);
+      if (plot.series.empty()) continue;
+      if (!std::exchange(any, true)) page.heading("Error over time"), page.begin_choices({"error of", "with"});
+      page.begin_choice({tradeoff.quantities()[q].name, methods});
+      page.paragraph(sentence_of(result, tradeoff, q));
+      page.plot(plot);
+      page.end_choice();
     }
   }
-  if (choices.empty()) return;
-  page.heading("Error over time");
-  page.begin_choices({"error of", "with"});
-  for (const Chosen& chosen : choices) {
-    page.begin_choice({quantities[chosen.quantity].name, chosen.methods});
-    page.paragraph(sentence_of(result, tradeoff, chosen.quantity));
-    page.plot(chosen.plot);
-    page.end_choice();
-  }
-  page.end_choices();
-  page.note(kHowToRead);
+  if (any) page.end_choices(), page.note(kHowToRead);
 }
 
 void add_recommendations(HtmlPage& page, const Json& result) {
@@ -176,17 +157,17 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
   if (tradeoff.rows.empty()) return;
   page.heading("All settings");
   std::vector<std::string> header{"setting", "time [ms]", "repetitions", "steps", "right-hand sides", "factorisations"};
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
+  const std::vector<Quantity>& quantities = tradeoff.quantities();
   for (const Quantity& q : quantities) header.push_back(q.name);
   std::vector<std::vector<std::string>> rows, without;  // without: settings that have no result
   for (const TradeoffRow& r : tradeoff.rows) {
-    if (r.status != RowStatus::ok) {
+    if (!r.ok()) {
       without.push_back({in_words(r.setting), std::string(to_string(r.status)), r.message});
       continue;
     }
     std::vector<std::string> row{in_words(r.setting),
                                  fmt::format("{:.3g}", 1e3 * r.wall_seconds),
-                                 std::to_string(r.repetitions),
+                                 std::to_string(r.runs.size()),
                                  std::to_string(r.statistics.steps),
                                  std::to_string(r.statistics.rhs_evaluations),
                                  std::to_string(r.statistics.factorisations)};
@@ -208,10 +189,6 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
 
 void add_machine(HtmlPage& page, const Json& result) {
   page.paragraph("Times are medians, measured on " + machine_name(result.at("machine")) + ".");
-}
-
-LinePlot alpha_plot(const std::string& title, const std::string& label) {
-  return {.title = title, .x_label = "alpha [-]", .y_label = label, .logarithmic_y = true, .logarithmic_x = true};
 }
 
 }  // namespace
@@ -238,53 +215,60 @@ std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff, const 
 
 std::string penalty_report(const Json& result, const PenaltyStudy& study) {
   HtmlPage page(report_title(result));
+  const auto add_plot = [&](const std::string& title, const std::string& label, std::vector<PlotSeries> series) {
+    for (PlotSeries& s : series)
+      for (const PenaltyStudyRow& row : study.rows) s.x.push_back(row.alpha);
+    page.plot({.title = title,
+               .x_label = "alpha [-]",
+               .y_label = label,
+               .series = std::move(series),
+               .logarithmic_y = true,
+               .logarithmic_x = true});
+  };
+  const auto over_alpha = [&](const auto& value_of) {
+    std::vector<double> values;
+    for (const PenaltyStudyRow& row : study.rows) values.push_back(value_of(row));
+    return values;
+  };
   add_status(page, result);
   add_machine(page, result);
   page.heading("Accelerations");
-  LinePlot accelerations = alpha_plot("Relative error of accelerations", "relative error [-]");
-  PlotSeries model{"penalty against the constrained equations", {}, {}, Mark::line},
-      rounding{"rounding by Cholesky", {}, {}, Mark::line}, augmented{"augmented Lagrangian", {}, {}, Mark::dashed};
-  std::vector<std::vector<std::string>> rows;
+  add_plot("Relative error of accelerations", "relative error [-]",
+           {{"penalty against the constrained equations", {}, over_alpha(std::mem_fn(&PenaltyStudyRow::model_error))},
+            {"rounding by Cholesky", {}, over_alpha(std::mem_fn(&PenaltyStudyRow::rounding_error))},
+            {"augmented Lagrangian", {}, over_alpha(std::mem_fn(&PenaltyStudyRow::augmented_error)), Mark::dashed}});
+  std::vector<std::vector<std::string>> rows, runs;
   for (const PenaltyStudyRow& row : study.rows) {
-    for (PlotSeries* s : {&model, &rounding, &augmented}) s->x.push_back(row.alpha);
-    model.y.push_back(row.model_error), rounding.y.push_back(row.rounding_error);
-    augmented.y.push_back(row.augmented_error);
-    rows.push_back({fmt::format("{:.0e}", row.alpha), error_text(row.model_error), error_text(row.rounding_error),
-                    error_text(row.augmented_error)});
+    const std::string alpha = fmt::format("{:.0e}", row.alpha);
+    rows.push_back(
+        {alpha, error_text(row.model_error), error_text(row.rounding_error), error_text(row.augmented_error)});
+    for (const auto& [name, i] : {std::pair{"quasi-definite", row.quasidefinite}, {"cholesky", row.cholesky}}) {
+      const TradeoffRow& r = study.table.rows[i];
+      runs.push_back({alpha, name, std::to_string(r.statistics.rhs_evaluations),
+                      r.ok() ? fmt::format("{:.3g}", r.wall_seconds) : "-",
+                      r.ok() ? error_text(r.statistics.max_position_violation) : "-", r.ok() ? "ok" : r.message});
+    }
   }
-  accelerations.series = {model, rounding, augmented};
-  page.plot(accelerations);
   page.table({"alpha", "model error", "rounding by Cholesky", "augmented Lagrangian"}, rows);
   page.heading("Runs");
-  page.paragraph(fmt::format("{} at rtol {:g}; xi {:g}, omega {:g}.", study.integrator, study.rtol,
+  page.paragraph(fmt::format("{} at rtol {:g}; xi {:g}, omega {:g}.", study.integrator.type, study.integrator.rtol,
                              study.formulation.xi, study.formulation.omega));
-  const std::vector<Quantity>& quantities = study.reference.errors->quantities();
-  for (std::size_t q = 0; q < quantities.size(); ++q) {
-    const auto column = static_cast<Eigen::Index>(q);
-    LinePlot plot =
-        alpha_plot("Error of " + quantities[q].name,
-                   fmt::format("error of {} [{}]", quantities[q].name, quantities[q].relative ? "-" : kUnknownUnit));
-    PlotSeries quasi{"quasi-definite", {}, {}, Mark::line}, cholesky{"cholesky", {}, {}, Mark::line},
-        rounded{"rounding by Cholesky on equal steps", {}, {}, Mark::dashed};
-    for (const PenaltyStudyRow& row : study.rows) {
-      for (PlotSeries* s : {&quasi, &cholesky, &rounded}) s->x.push_back(row.alpha);
-      quasi.y.push_back(row.quasidefinite.errors(column)), cholesky.y.push_back(row.cholesky.errors(column));
-      rounded.y.push_back(row.rounding(column));
-    }
-    plot.series = {quasi, cholesky, rounded};
-    page.plot(plot);
+  Eigen::Index column = 0;
+  for (const Quantity& q : study.table.quantities()) {
+    const auto errors_of = [&](std::size_t PenaltyStudyRow::*run) {
+      return over_alpha([&](const PenaltyStudyRow& row) { return study.table.rows[row.*run].errors(column); });
+    };
+    add_plot("Error of " + q.name, fmt::format("error of {} [{}]", q.name, q.relative ? "-" : kUnknownUnit),
+             {{"quasi-definite", {}, errors_of(&PenaltyStudyRow::quasidefinite)},
+              {"cholesky", {}, errors_of(&PenaltyStudyRow::cholesky)},
+              {"rounding by Cholesky on equal steps",
+               {},
+               over_alpha([&](const PenaltyStudyRow& row) { return row.rounding(column); }),
+               Mark::dashed}});
+    ++column;
   }
-  rows.clear();
-  for (const PenaltyStudyRow& row : study.rows) {
-    for (const auto& [name, r] : {std::pair<const char*, const PenaltyRun&>{"quasi-definite", row.quasidefinite},
-                                  std::pair<const char*, const PenaltyRun&>{"cholesky", row.cholesky}}) {
-      rows.push_back({fmt::format("{:.0e}", row.alpha), name, std::to_string(r.statistics.rhs_evaluations),
-                      r.ok ? fmt::format("{:.3g}", r.wall_seconds) : "-",
-                      r.ok ? error_text(r.statistics.max_position_violation) : "-", r.ok ? "ok" : r.message});
-    }
-  }
-  page.table({"alpha", "solver", "right-hand sides", "time [s]", "drift", "outcome"}, rows);
-  add_reference(page, result, study.reference);
+  page.table({"alpha", "solver", "right-hand sides", "time [s]", "drift", "outcome"}, runs);
+  add_reference(page, result, study.table.reference);
   add_model(page, result);
   add_provenance(page, result);
   return page.text();

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "app/terminal/text_table.hpp"
@@ -13,82 +12,66 @@
 namespace mbsopt {
 namespace {
 
-Json row_json(const Tradeoff& tradeoff, std::size_t index) {
-  const TradeoffRow& row = tradeoff.rows[index];
+constexpr double kAdvisedAccuracies[] = {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
+
+Json row_json(const Tradeoff& tradeoff, const TradeoffRow& row) {
   Json json{{"setting", in_words(row.setting)}, {"status", to_string(row.status)}};
-  if (row.status != RowStatus::ok) json["message"] = row.message;
-  if (row.status == RowStatus::ok) json["wall_seconds"] = row.wall_seconds;
-  json["errors"] = errors_json(tradeoff.reference.errors->quantities(), row.errors);
+  if (!row.ok()) json["message"] = row.message;
+  if (row.ok()) json["wall_seconds"] = row.wall_seconds;
+  json["errors"] = errors_json(tradeoff.quantities(), row.errors);
   return json;
 }
 
-// Includes the bounds of the choice, and for a gradient those of its simulation.
-Json recommended_json(const Tradeoff& tradeoff, std::size_t index) {
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
-  Json json = row_json(tradeoff, index);
-  json["bounds"] = errors_json(quantities, tradeoff.rows[index].bounds);
-  const std::optional<std::size_t> simulation = simulation_of(tradeoff, index);
-  if (simulation && simulation != index) {
-    json["errors"].update(errors_json(quantities, tradeoff.rows[*simulation].errors));
-    json["bounds"].update(errors_json(quantities, tradeoff.rows[*simulation].bounds));
+// Figures of a row, and for a gradient those of its simulation.
+Eigen::VectorXd figures_of(const Tradeoff& tradeoff, std::size_t row, Eigen::VectorXd TradeoffRow::*figures) {
+  Eigen::VectorXd all = tradeoff.rows[row].*figures;
+  Eigen::Index q = 0;
+  for (const Quantity& quantity : tradeoff.quantities()) {
+    const std::optional<std::size_t> with = row_with(tradeoff, row, quantity.kind);
+    if (with) all(q) = (tradeoff.rows[*with].*figures)(q);
+    ++q;
   }
-  return json;
-}
-
-std::string names_of(const std::vector<Quantity>& quantities, const std::vector<std::size_t>& indices) {
-  std::string names;
-  for (const std::size_t q : indices) names += (names.empty() ? "" : " and ") + quantities[q].name;
-  return names;
+  return all;
 }
 
 // "error 3.1e-05", of several "errors: 7.5e-08 in path, 2.9e-06 in gradient of path"
-std::string errors_text(const Tradeoff& tradeoff, const TaskAdvice& advice) {
-  const Recommendation& r = advice.recommendation;
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
-  const std::size_t simulation = simulation_of(tradeoff, *r.row).value_or(*r.row);
-  const auto error = [&](std::size_t q) {
-    const bool of_gradient = quantities[q].kind == QuantityKind::gradient;
-    return error_text(tradeoff.rows[of_gradient ? *r.row : simulation].errors(static_cast<Eigen::Index>(q)),
-                      quantities[q].certificate);
+std::string errors_text(const Tradeoff& tradeoff, const Recommendation& advice, const FitErrors* fit) {
+  const Eigen::VectorXd errors = figures_of(tradeoff, *advice.row, &TradeoffRow::errors);
+  std::vector<std::string> parts;
+  const auto add = [&](double error, double certificate, const std::string& name) {
+    const bool alone = advice.quantities.size() == 1 && !advice.fit;
+    parts.push_back(error_text(error, certificate) + (alone ? "" : " in " + name));
   };
-  if (r.quantities.size() == 1 && !advice.fit) return "error " + error(r.quantities[0]);
-  std::string text = "errors: ";
-  for (const std::size_t q : r.quantities)
-    text += fmt::format("{}{} in {}", text.ends_with(": ") ? "" : ", ", error(q), quantities[q].name);
-  if (advice.fit)
-    text += fmt::format(", {} in the sum of squares, {} in its gradient",
-                        error_text(advice.fit->cost, advice.fit_certificate.cost),
-                        error_text(advice.fit->gradient, advice.fit_certificate.gradient));
-  return text;
-}
-
-// The words of a recommendation: its purpose and its setting.
-struct RecommendationWords {
-  double accuracy;
-  std::string aim, setting;  // "track"; "dopri5 at rtol 1e-05, 12 ms (error 3.1e-05)", or why there is none
-
-  std::string sentence() const { return fmt::format("for {:.0e} in {}: {}", accuracy, aim, setting); }
-  Json json() const {
-    return {{"accuracy", accuracy}, {"aim", aim}, {"setting_in_words", setting}, {"in_words", sentence()}};
+  for (const std::size_t q : advice.quantities)
+    add(errors(static_cast<Eigen::Index>(q)), tradeoff.quantities()[q].certificate, tradeoff.quantities()[q].name);
+  if (advice.fit) {
+    add(advice.fit->cost, fit->certificate().cost, "the sum of squares");
+    add(advice.fit->gradient, fit->certificate().gradient, "its gradient");
   }
-};
-
-RecommendationWords words_of(const Tradeoff& tradeoff, const TaskAdvice& advice, bool of_fit = false) {
-  const Recommendation& r = advice.recommendation;
-  RecommendationWords words{r.accuracy, names_of(tradeoff.reference.errors->quantities(), r.quantities), r.why_not};
-  if (of_fit) words.aim += " and the sum of squares of identify with its gradient";
-  if (!r.row) return words;
-  const TradeoffRow& row = tradeoff.rows[*r.row];
-  words.setting =
-      fmt::format("{}, {} ({})", in_words(row.setting), duration_text(row.wall_seconds), errors_text(tradeoff, advice));
-  return words;
+  return fmt::format("{}{}", parts.size() == 1 ? "error " : "errors: ", fmt::join(parts, ", "));
 }
 
-constexpr std::array kAdvisedAccuracies{1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
-
-Json task_json(const Tradeoff& tradeoff, const TaskAdvice& advice, const RecommendationWords& words) {
-  Json json = words.json();
-  if (advice.recommendation.row) json.update(recommended_json(tradeoff, *advice.recommendation.row));
+// An advice in words and figures: "for 1e-04 in track: dopri5 at rtol 1e-05, 12 ms (error 3.1e-05)", or why there is
+// none. fit is null if nothing is fitted.
+Json advice_json(const Tradeoff& tradeoff, const Recommendation& advice, const FitErrors* fit) {
+  std::vector<std::string> names;
+  for (const std::size_t q : advice.quantities) names.push_back(tradeoff.quantities()[q].name);
+  const std::string aim = fmt::format("{}{}", fmt::join(names, " and "),
+                                      fit ? " and the sum of squares of identify with its gradient" : "");
+  std::string setting = advice.why_not;
+  if (advice.row) {
+    const TradeoffRow& row = tradeoff.rows[*advice.row];
+    setting = fmt::format("{}, {} ({})", in_words(row.setting), duration_text(row.wall_seconds),
+                          errors_text(tradeoff, advice, fit));
+  }
+  Json json{{"accuracy", advice.accuracy},
+            {"aim", aim},
+            {"setting_in_words", setting},
+            {"in_words", fmt::format("for {:.0e} in {}: {}", advice.accuracy, aim, setting)}};
+  if (!advice.row) return json;
+  json.update(row_json(tradeoff, tradeoff.rows[*advice.row]));
+  for (const auto& [name, figures] : {std::pair{"errors", &TradeoffRow::errors}, {"bounds", &TradeoffRow::bounds}})
+    json[name] = errors_json(tradeoff.quantities(), figures_of(tradeoff, *advice.row, figures));
   if (advice.fit) json["fit"] = {{"error", advice.fit->cost}, {"gradient_error", advice.fit->gradient}};
   return json;
 }
@@ -102,6 +85,18 @@ std::string doubt(const Quantity& q, const std::vector<ObjectiveSpec>& objective
       "too much `sharpness`, {:g} now: give it some tens to hundreds, divided by the range of its values? "
       "Or {}",
       spec->sharpness.value_or(ObjectiveSpec::kSharpness), any);
+}
+
+void add_right_values(Run& run, const Answer& exact) {
+  const std::vector<Parameter>& parameters = run.problem.scene.parameters;
+  Eigen::Index row = 0;
+  for (const ObjectiveSpec& o : run.problem.objectives) {
+    Json& objective = run.result["objectives"][o.name];
+    objective["value"] = exact.psi(row);
+    for (std::size_t k = 0; k < parameters.size() && exact.psi_rho.size() > 0; ++k)
+      objective["gradient"][parameters[k].name] = exact.psi_rho(row, static_cast<Eigen::Index>(k));
+    ++row;
+  }
 }
 
 }  // namespace
@@ -143,107 +138,93 @@ void add_reference(Run& run, const TradeoffReference& reference) {
                                   ? fmt::format("{:.3g} m from its start", q.scale)
                                   : "";
     table.add({q.name, words, fmt::format("{:.1e}{}", q.certificate, q.relative ? "" : " (absolute)")});
-  }
-  const std::vector<Parameter>& parameters = run.problem.scene.parameters;
-  for (std::size_t i = 0; i < run.problem.objectives.size(); ++i) {
-    const Eigen::Index row = static_cast<Eigen::Index>(i);
-    Json& objective = run.result["objectives"][run.problem.objectives[i].name];
-    objective["value"] = errors.exact().psi(row);
-    for (std::size_t k = 0; k < parameters.size() && errors.exact().psi_rho.size() > 0; ++k)
-      objective["gradient"][parameters[k].name] = errors.exact().psi_rho(row, static_cast<Eigen::Index>(k));
+    if (q.is_doubtful())
+      run.warn(fmt::format("the reference of {} is known to {:.1e} only: smaller errors cannot be measured ({})",
+                           q.name, q.certificate, doubt(q, run.problem.objectives)));
   }
   run.context.out << fmt::format("reference: {}, certified by {}; {}\n", in_words(reference.first),
                                  in_words(reference.second), duration_text(reference.wall_seconds))
                   << '\n'
                   << table.text();
-  for (const Quantity& q : errors.quantities()) {
-    if (!q.is_doubtful()) continue;
-    run.warn(fmt::format("the reference of {} is known to {:.1e} only: smaller errors cannot be measured ({})", q.name,
-                         q.certificate, doubt(q, run.problem.objectives)));
-  }
   if (!errors.moves())
     run.warn(
         fmt::format("nothing moves: the mechanism stays within {:.1e} m of its start, so all settings are equally "
                     "exact. Start it off its equilibrium to compare settings",
                     errors.extent()));
-  std::string others;
+  std::vector<std::string> others;
   for (const ObjectiveSpec& o : run.problem.objectives) {
-    const auto same = [&](const Quantity& q) { return q.objective_name == o.name; };
-    if (std::ranges::any_of(errors.quantities(), same)) continue;
-    run.result["reference"]["without_integration"].push_back(o.name);
-    others += (others.empty() ? "'" : ", '") + o.name + "'";
+    if (std::ranges::count(errors.quantities(), o.name, &Quantity::objective_name) > 0) continue;
+    json["without_integration"].push_back(o.name);
+    others.push_back("'" + o.name + "'");
   }
   if (!others.empty())
-    run.context.out << fmt::format("not measured, since they do not depend on the integration: {}\n", others);
+    run.context.out << fmt::format("not measured, since they do not depend on the integration: {}\n",
+                                   fmt::join(others, ", "));
+  add_right_values(run, errors.exact());
 }
 
 void add_given_settings(Run& run, const Tradeoff& tradeoff) {
   std::vector<std::string> header{"setting", "time"};
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
-  for (const Quantity& q : quantities) header.push_back(q.name);
+  for (const Quantity& q : tradeoff.quantities()) header.push_back(q.name);
   TextTable table(header);
-  const bool is_default = tradeoff.own == tradeoff.defaults;
-  const auto add = [&](const char* name, const std::optional<std::size_t>& simulation,
-                       const std::optional<std::size_t>& gradient, bool shown) {
-    for (const std::optional<std::size_t>& i : {simulation, gradient}) {
-      if (!i || !shown) continue;
-      const TradeoffRow& row = tradeoff.rows[*i];
-      std::vector<std::string> cells{in_words(row.setting),
-                                     row.status == RowStatus::ok ? duration_text(row.wall_seconds) : "-"};
-      for (std::size_t q = 0; q < quantities.size(); ++q)
-        cells.push_back(error_text(row.errors(static_cast<Eigen::Index>(q)), quantities[q].certificate));
-      table.add(cells);
-      if (row.status != RowStatus::ok) run.warn(fmt::format("{}: {}", cells[0], row.message));
-    }
-    if (simulation) run.result["settings"][name] = row_json(tradeoff, *simulation);
-    if (gradient) run.result["settings"][name]["gradient"] = row_json(tradeoff, *gradient);
+  const auto add = [&](std::optional<std::size_t> index, Json& json, bool shown) {
+    if (!index) return;
+    const TradeoffRow& row = tradeoff.rows[*index];
+    json.update(row_json(tradeoff, row));
+    if (!shown) return;
+    std::vector<std::string> cells{in_words(row.setting), row.ok() ? duration_text(row.wall_seconds) : "-"};
+    Eigen::Index column = 0;
+    for (const Quantity& q : tradeoff.quantities()) cells.push_back(error_text(row.errors(column++), q.certificate));
+    table.add(cells);
+    if (!row.ok()) run.warn(fmt::format("{}: {}", cells[0], row.message));
   };
-  add("own", tradeoff.own, tradeoff.own_gradient, true);
-  add("defaults", tradeoff.defaults, tradeoff.default_gradient, !is_default);
+  const bool is_default = tradeoff.own == tradeoff.defaults;
+  const auto add_both = [&](const char* name, std::optional<std::size_t> simulation,
+                            std::optional<std::size_t> gradient, bool shown) {
+    if (simulation) add(simulation, run.result["settings"][name], shown);
+    if (gradient) add(gradient, run.result["settings"][name]["gradient"], shown);
+  };
+  add_both("own", tradeoff.own, tradeoff.own_gradient, true);
+  add_both("defaults", tradeoff.defaults, tradeoff.default_gradient, !is_default);
   run.context.out << "\nerrors\n" << table.text();
   if (is_default && tradeoff.own) run.context.out << "the file's settings are the defaults\n";
-  if (!tradeoff.own || tradeoff.rows[*tradeoff.own].status != RowStatus::ok) return;
+  if (!tradeoff.own || !tradeoff.rows[*tradeoff.own].ok()) return;
   for (const std::string& warning : simulation_warnings(run.problem.scene, tradeoff.rows[*tradeoff.own].statistics))
     run.warn("as in the file: " + warning);
 }
 
-void add_fit_errors(Run& run, const FitErrors& errors) {
+void add_fit_errors(Run& run, const FitErrors& fit) {
   Json& json = run.result["fit"];
-  if (!errors.ok()) {
-    json = {{"message", errors.message}};
-    return run.warn("the error of what identify minimises is not known: " + errors.message);
+  const FitErrors::Error& apart = fit.certificate();
+  if (!fit.ok()) {
+    json = {{"message", apart.message}};
+    return run.warn("the error of what identify minimises is not known: " + apart.message);
   }
-  json = {{"cost", errors.cost},
-          {"apart", errors.certificate.cost},
-          {"gradient", {{"apart", errors.certificate.gradient}}},
-          {"relative", true}};
+  json = {{"cost", fit.cost()}, {"apart", apart.cost}, {"gradient", {{"apart", apart.gradient}}}, {"relative", true}};
   TextTable table({"sum of squares of identify", "its error", "of its gradient"});
-  table.add({"two methods apart", error_text(errors.certificate.cost), error_text(errors.certificate.gradient)});
-  for (const FitErrors::Setting& s : errors.settings) {
-    if (!s.message.empty()) {
-      json["settings"][s.name] = {{"message", s.message}};
-      run.warn(fmt::format("identify, {}: {}", s.name, s.message));
+  table.add({"two methods apart", error_text(apart.cost), error_text(apart.gradient)});
+  const SimulationSettings& own = run.problem.scene.simulation;
+  for (const auto& [name, settings] : {std::pair{"own", own}, {"defaults", with_defaults(own)}}) {
+    const FitErrors::Error error = fit.at(settings);
+    if (!error.ok()) {
+      json["settings"][name] = {{"message", error.message}};
+      run.warn(fmt::format("identify, {}: {}", name, error.message));
       continue;
     }
-    json["settings"][s.name] = {{"error", s.error.cost}, {"gradient_error", s.error.gradient}};
-    table.add({s.name, error_text(s.error.cost, errors.certificate.cost),
-               error_text(s.error.gradient, errors.certificate.gradient)});
+    json["settings"][name] = {{"error", error.cost}, {"gradient_error", error.gradient}};
+    table.add({name, error_text(error.cost, apart.cost), error_text(error.gradient, apart.gradient)});
   }
   run.context.out << '\n' << table.text();
 }
 
 void add_recommendations(Run& run, const Tradeoff& tradeoff) {
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
-  for (std::size_t q = 0; q < quantities.size(); ++q) {
+  for (std::size_t q = 0; q < tradeoff.quantities().size(); ++q) {
     run.context.out << '\n';
     for (const double accuracy : kAdvisedAccuracies) {
-      const Recommendation r = recommend(tradeoff, {q}, accuracy);
-      const RecommendationWords words = words_of(tradeoff, {r, {}});
-      Json json = words.json();
-      json["quantity"] = quantities[q].name;
-      if (r.row) json.update(recommended_json(tradeoff, *r.row));
-      run.result["recommendations"].push_back(json);
-      run.context.out << words.sentence() << '\n';
+      Json& json = run.result["recommendations"].emplace_back(
+          advice_json(tradeoff, recommend(tradeoff, {q}, accuracy), nullptr));
+      json["quantity"] = tradeoff.quantities()[q].name;
+      run.context.out << json["in_words"].get<std::string>() << '\n';
     }
   }
 }
@@ -251,35 +232,31 @@ void add_recommendations(Run& run, const Tradeoff& tradeoff) {
 void add_task_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser) {
   run.context.out << '\n';
   for (const double accuracy : kAdvisedAccuracies) {
-    const TaskAdvice advice = adviser.at(accuracy);
-    const RecommendationWords words = words_of(tradeoff, advice, run.problem.identification.has_value());
-    run.result["task_recommendations"].push_back(task_json(tradeoff, advice, words));
-    run.context.out << words.sentence() << '\n';
+    const Json& json =
+        run.result["task_recommendations"].emplace_back(advice_json(tradeoff, adviser.at(accuracy), adviser.fit()));
+    run.context.out << json["in_words"].get<std::string>() << '\n';
   }
 }
 
 void add_outcomes(Run& run, const Tradeoff& tradeoff) {
-  const auto count = [&](RowStatus status) {
-    return std::count_if(tradeoff.rows.begin(), tradeoff.rows.end(),
-                         [&](const TradeoffRow& row) { return row.status == status; });
-  };
+  const auto count = [&](RowStatus status) { return std::ranges::count(tradeoff.rows, status, &TradeoffRow::status); };
   for (const TradeoffRow& row : tradeoff.rows)
-    if (row.status != RowStatus::ok)
+    if (!row.ok())
       run.result["skipped"].push_back(
           {{"setting", in_words(row.setting)}, {"status", to_string(row.status)}, {"message", row.message}});
   const auto measured = count(RowStatus::ok);
-  const bool all = measured == static_cast<std::ptrdiff_t>(tradeoff.rows.size());
+  const bool all = measured == std::ssize(tradeoff.rows);
   run.context.out << fmt::format("\n{} measured, {} failed, {} abandoned, {} skipped{}; {}\n",
                                  counted(measured, "setting"), count(RowStatus::failed), count(RowStatus::abandoned),
                                  count(RowStatus::skipped), all ? "" : " (tradeoff.csv says why)",
                                  duration_text(tradeoff.wall_seconds));
 }
 
-void add_applied(Run& run, const Tradeoff& tradeoff, const TaskAdvice& advice) {
-  const RecommendationWords words = words_of(tradeoff, advice, run.problem.identification.has_value());
-  run.result["applied"] = task_json(tradeoff, advice, words);
-  if (!advice.recommendation.row) return run.failed("no recommended.json: " + words.sentence());
-  run.context.out << "\napplied " << words.sentence() << '\n';
+void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& advice, const FitErrors* fit) {
+  const Json& json = run.result["applied"] = advice_json(tradeoff, advice, fit);
+  const std::string words = json["in_words"];
+  if (!advice.row) return run.failed("no recommended.json: " + words);
+  run.context.out << "\napplied " << words << '\n';
 }
 
 }  // namespace mbsopt

@@ -4,9 +4,8 @@
 #include <string>
 
 #include "app/run/run.hpp"
+#include "optim/tradeoff/advice.hpp"
 #include "optim/tradeoff/penalty_study.hpp"
-#include "optim/tradeoff/task_advice.hpp"
-#include "optim/tradeoff/tradeoff.hpp"
 
 namespace mbsopt {
 
@@ -20,13 +19,14 @@ Json errors_json(const std::vector<Quantity>& quantities, const Eigen::VectorXd&
 void add_reference(Run& run, const TradeoffReference& reference);
 // Adds the scene's own settings and the defaults.
 void add_given_settings(Run& run, const Tradeoff& tradeoff);
-void add_fit_errors(Run& run, const FitErrors& errors);
+// Adds the errors in the sum of squares of identify, of the scene's own settings and of the defaults.
+void add_fit_errors(Run& run, const FitErrors& fit);
 void add_recommendations(Run& run, const Tradeoff& tradeoff);
 // Adds recommendations for the task of the file, a design or an identification.
 void add_task_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser);
 void add_outcomes(Run& run, const Tradeoff& tradeoff);  // how many were measured; what was not, and why
 // Adds the choice of --apply. The run fails if there is nothing to choose.
-void add_applied(Run& run, const Tradeoff& tradeoff, const TaskAdvice& advice);
+void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& advice, const FitErrors* fit);
 
 void add_penalty_study(Run& run, const PenaltyStudy& study);
 

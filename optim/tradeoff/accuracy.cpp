@@ -17,8 +17,6 @@
 namespace mbsopt {
 namespace {
 
-using Eigen::Index;
-
 // Counts independent closed chains: joints between bodies that other joints connect already. The ground is a body here.
 int loops_of(const Scene& scene) {
   std::vector<std::string> names{"ground"};
@@ -38,12 +36,11 @@ int loops_of(const Scene& scene) {
   return loops;
 }
 
-SceneFeatures features_of(const Scene& scene) {
-  SceneFeatures features;
-  features.bodies = static_cast<int>(scene.bodies.size());
-  features.loops = loops_of(scene);
-  features.drives = static_cast<int>(scene.drives.size());
-  return features;
+double largest_of(const std::vector<ErrorEstimate>& estimates) {
+  double largest = 0;
+  for (const ErrorEstimate& e : estimates)
+    if (!(e.error <= largest)) largest = e.error;
+  return largest;
 }
 
 double rounded(double rtol) { return std::stod(fmt::format("{:.0e}", rtol)); }
@@ -53,20 +50,32 @@ class Chooser {
   Chooser(const Scene& scene, const std::vector<Objective>& objectives, const AccuracyOptions& options)
       : runs_(scene, objectives), options_(options), base_(scene.simulation) {
     result_.wanted = base_.accuracy.value();
-    result_.features = features_of(scene);
+    result_.features = {static_cast<int>(scene.bodies.size()), loops_of(scene), static_cast<int>(scene.drives.size())};
     base_.accuracy.reset();
   }
 
   AccuracyChoice run() {
     result_.settings = base_;
-    choose_explicit();
+    const bool high_order = result_.wanted < 1e-7;
+    method_ = high_order ? "dopri853" : "dopri5";
+    verifier_ = "dopri853";
+    result_.why = high_order ? "a high order for an accuracy this high" : "accuracy and not stability limits its steps";
     std::optional<Point> found = settled(kPilotSteps);
     if (!stiff_why_.empty() && !interrupted()) {
-      choose_implicit();
+      method_ = verifier_ = "radau5";
+      result_.why = "stiff: " + stiff_why_;
+      implicit_ = true;
       found = settled(base_.integrator.max_steps);
     }
-    if (found) conclude(*found);
-    if (!found && result_.message.empty()) result_.message = "no run came to its end";
+    result_.ok = found.has_value();
+    if (found) {
+      result_.settings = found->settings;
+      result_.settings.integrator.max_steps = base_.integrator.max_steps;
+      result_.estimates = found->estimates;
+      result_.reached = found->largest() <= result_.wanted;
+    } else if (result_.message.empty()) {
+      result_.message = "no run came to its end";
+    }
     return std::move(result_);
   }
 
@@ -80,24 +89,10 @@ class Chooser {
   struct Point {
     SimulationSettings settings;
     Answer answer;
-    Eigen::VectorXd errors;
     std::vector<ErrorEstimate> estimates;
     double rtol() const { return settings.integrator.rtol; }
-    double largest() const { return errors.maxCoeff(); }
+    double largest() const { return largest_of(estimates); }
   };
-
-  void choose_explicit() {
-    const bool high_order = result_.wanted < 1e-7;
-    method_ = high_order ? "dopri853" : "dopri5";
-    verifier_ = "dopri853";
-    result_.why = high_order ? "a high order for an accuracy this high" : "accuracy and not stability limits its steps";
-  }
-
-  void choose_implicit() {
-    method_ = verifier_ = "radau5";
-    result_.why = "stiff: " + stiff_why_;
-    implicit_ = true;
-  }
 
   bool interrupted() const { return options_.limit.interrupted && options_.limit.interrupted(); }
 
@@ -236,28 +231,13 @@ class Chooser {
   void judge(Point& point, const Answer& right) const {
     constexpr double kKnown = 10;
     const TradeoffErrors errors(runs_, right, point.answer, kKnown);
-    const std::vector<Quantity>& all = errors.quantities();
-    const auto has = [&](QuantityKind kind) { return std::ranges::find(all, kind, &Quantity::kind) != all.end(); };
-    const bool objectives = has(QuantityKind::objective);
-    const QuantityKind judged = objectives                         ? QuantityKind::objective
-                                : has(options_.without_objectives) ? options_.without_objectives
-                                                                   : QuantityKind::motion;
-    for (const Quantity& q : all) {
-      if (q.kind != judged) continue;
-      const std::string name = objectives ? runs_.objectives()[static_cast<std::size_t>(q.objective)].name() : q.name;
-      point.estimates.push_back({name, q.relative, std::max(q.certificate, AccuracyChoice::kRounding)});
+    for (const QuantityKind kind : {QuantityKind::objective, options_.without_objectives, QuantityKind::motion}) {
+      for (const Quantity& q : errors.quantities())
+        if (q.kind == kind)
+          point.estimates.push_back({kind == QuantityKind::objective ? q.objective_name : q.name, q.relative,
+                                     std::max(q.certificate, AccuracyChoice::kRounding)});
+      if (!point.estimates.empty()) return;
     }
-    point.errors.resize(static_cast<Index>(point.estimates.size()));
-    for (std::size_t i = 0; i < point.estimates.size(); ++i)
-      point.errors(static_cast<Index>(i)) = point.estimates[i].error;
-  }
-
-  void conclude(const Point& point) {
-    result_.ok = true;
-    result_.settings = point.settings;
-    result_.settings.integrator.max_steps = base_.integrator.max_steps;
-    result_.estimates = point.estimates;
-    result_.reached = point.largest() <= result_.wanted;
   }
 
   const TradeoffRuns runs_;
@@ -271,11 +251,7 @@ class Chooser {
 
 }  // namespace
 
-double AccuracyChoice::largest_error() const {
-  double largest = 0;
-  for (const ErrorEstimate& e : estimates) largest = std::max(largest, e.error);
-  return largest;
-}
+double AccuracyChoice::largest_error() const { return largest_of(estimates); }
 
 AccuracyChoice choose_accuracy(const Scene& scene, const std::vector<Objective>& objectives,
                                const AccuracyOptions& options) {

@@ -12,54 +12,30 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "optim/tradeoff/tradeoff_reference.hpp"
+#include "optim/tradeoff/tradeoff_measurement.hpp"
 
 namespace mbsopt {
-
-struct PenaltyRun {
-  bool ok = false;
-  std::string message;     // why not
-  Eigen::VectorXd errors;  // per quantity
-  SimulationStatistics statistics;
-  double wall_seconds = 0;  // median
-};
 
 struct PenaltyStudyRow {
   double alpha = 0;
   double model_error = 0, rounding_error = 0, augmented_error = 0;  // of accelerations; NaN: they cannot be computed
-  PenaltyRun quasidefinite, cholesky;
-  Eigen::VectorXd rounding;  // per quantity; NaN where that run failed
+  std::size_t quasidefinite = 0, cholesky = 0;                      // rows of the table
+  Eigen::VectorXd rounding;                                         // per quantity; NaN where that run failed
 };
 
 struct PenaltyStudy {
-  std::string message;  // why there is nothing
-  TradeoffReference reference;
+  Tradeoff table;                   // its first row: the constrained equations, with the same integrator
   FormulationSettings formulation;  // xi, omega, projection of all penalty runs
-  std::string integrator;
-  double rtol = 0, atol = 0;
-  PenaltyRun constrained;  // with the same integrator
+  IntegratorSettings integrator;
   std::vector<PenaltyStudyRow> rows;
-  bool interrupted = false;
-  double wall_seconds = 0;
-  bool ok() const { return reference.ok(); }
-};
-
-struct PenaltyStudyOptions {
-  std::vector<double> alphas;
-  double rtol = 1e-9;
-  double budget_seconds = 60;
-  std::function<bool()> interrupted = {};
-  std::function<void(const std::string& doing, double done)> progress = {};
-  Clock clock = {};  // of the budget and of all times
 };
 
 // xi, omega and projection are the scene's if it has a penalty form, else MBSVT's: 1, 10 and none.
 PenaltyStudy study_penalty(const Scene& scene, const std::vector<Objective>& objectives,
-                           const PenaltyStudyOptions& options);
+                           const std::vector<double>& alphas, const TradeoffOptions& options = {});
 
 // "1e2:1e16" means all powers of ten in this range, "1e5,3e7" these two. Throws std::invalid_argument.
 std::vector<double> alphas_of(const std::string& text);

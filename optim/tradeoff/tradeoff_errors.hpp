@@ -44,26 +44,27 @@ class TradeoffErrors {
   // the two.
   TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Answer& second, double clearly = 1e3);
 
-  // The same measures against another answer, with the same scales.
-  TradeoffErrors(TradeoffErrors measures, Answer exact) : TradeoffErrors(std::move(measures)) {
-    exact_ = std::move(exact);
-  }
-
   const Answer& exact() const { return exact_; }
   const std::vector<Quantity>& quantities() const { return quantities_; }
   // The largest distance of the motion from its start [m], and whether that is more than rounding.
   double extent() const { return distance_.extent(exact_.motion, exact_.y_initial); }
   bool moves() const { return quantities_.front().relative || quantities_.front().is_doubtful(); }
   // One error per quantity; NaN if the answer does not contain it.
-  Eigen::VectorXd of(const Answer& answer) const;
+  Eigen::VectorXd of(const Answer& answer) const { return of(answer, exact_); }
+  // With the same scales, against another answer.
+  Eigen::VectorXd of(const Answer& answer, const Answer& exact) const {
+    return each(&TradeoffErrors::error, answer, exact);
+  }
   // Likewise the deviations; NaN for the motion and the sensors, which have no single sign.
-  Eigen::VectorXd deviations(const Answer& answer) const;
+  Eigen::VectorXd deviations(const Answer& answer) const { return each(&TradeoffErrors::deviation, answer, exact_); }
 
  private:
-  double error(const Quantity& quantity, const Answer& answer) const;
-  double deviation(const Quantity& quantity, const Answer& answer) const;
+  using Measure = double (TradeoffErrors::*)(const Quantity& quantity, const Answer& answer, const Answer& exact) const;
+  double error(const Quantity& quantity, const Answer& answer, const Answer& exact) const;
+  double deviation(const Quantity& quantity, const Answer& answer, const Answer& exact) const;
+  Eigen::VectorXd each(Measure measure, const Answer& answer, const Answer& exact) const;
   bool is_known(double size, double apart) const { return size > clearly_ * apart; }
-  double sensor_error(const Answer& answer) const;
+  double sensor_error(const Answer& answer, const Answer& exact) const;
   double gradient_size(const Eigen::Ref<const Eigen::RowVectorXd>& gradient) const;
 
   MotionDistance distance_;

@@ -52,6 +52,9 @@ TradeoffReference converged_reference(const TradeoffRuns& runs, const ReferenceO
 // scene has a fixed step.
 SimulationSettings with_tolerance(SimulationSettings settings, const std::string& integrator, double rtol);
 
+// The scene's settings with the program's default integrator and formulation.
+SimulationSettings with_defaults(SimulationSettings settings);
+
 // The constrained equations: the scene's own formulation if it is an augmented Lagrangian with full projection.
 FormulationSettings constrained(const FormulationSettings& formulation);
 

@@ -45,10 +45,14 @@ class TradeoffRuns {
   TradeoffRuns(Scene scene, std::vector<Objective> objectives);
 
   // psi alone, as a simulation computes it. This is timed.
-  Answer values(const SimulationSettings& settings, const RunLimit& limit = {}) const;
+  Answer values(const SimulationSettings& settings, const RunLimit& limit = {}) const {
+    return run(settings, limit, nullptr, false);
+  }
   // Adds the motion and the sensors at sample times. With frozen, it takes the steps of another run.
   Answer motion(const SimulationSettings& settings, const RunLimit& limit = {},
-                const StepSequence* frozen = nullptr) const;
+                const StepSequence* frozen = nullptr) const {
+    return run(settings, limit, frozen, true);
+  }
   // psi and psi_rho in all parameters. The limit applies to the forward part.
   Answer gradients(const SimulationSettings& settings, GradientMethod method, const RunLimit& limit = {}) const;
 
@@ -56,6 +60,7 @@ class TradeoffRuns {
   const std::vector<Objective>& objectives() const { return objectives_; }
   const Mechanism& mechanism() const { return mechanism_; }  // without derivatives
   bool has_gradients() const;                                // objectives that are simulated, and parameters
+  GradientMethod discrete_method() const;                    // the cheaper one, tlm or adjoint
 
  private:
   Answer run(const SimulationSettings& settings, const RunLimit& limit, const StepSequence* frozen, bool sampled) const;

@@ -6,7 +6,6 @@
 
 #include "app/json/read_problem.hpp"
 #include "optim/tradeoff/tradeoff.hpp"
-#include "optim/tradeoff/tradeoff_curves.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/optim/counted_clock.hpp"
 
@@ -41,7 +40,7 @@ TEST_CASE("work-precision curves are monotone in work and bound, gradients inclu
   options.budget_seconds = swept.budget, options.clock = clock.clock();
   const Tradeoff tradeoff = measure_tradeoff(problem.scene, objectives_of(problem), options);
   REQUIRE(tradeoff.ok());
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
+  const std::vector<Quantity>& quantities = tradeoff.quantities();
   int points = 0, drawn = 0, close = 0, gradients = 0;
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     const auto column = static_cast<Eigen::Index>(q);

@@ -30,30 +30,29 @@ TEST_CASE("alpha: the model's error falls as 1/alpha, Cholesky's rounding grows 
   Problem p = five_bar::problem();
   p.scene.simulation.end_time = 0.3;
   CountedClock clock;
-  PenaltyStudyOptions options;
-  options.alphas = {1e3, 1e5, 1e7, 1e14};
+  TradeoffOptions options;
   options.budget_seconds = 4, options.clock = clock.clock();
-  const PenaltyStudy study = study_penalty(p.scene, objectives_of(p), options);
-  INFO(study.message);
-  REQUIRE(study.ok());
+  const PenaltyStudy study = study_penalty(p.scene, objectives_of(p), {1e3, 1e5, 1e7, 1e14}, options);
+  INFO(study.table.message);
+  REQUIRE(study.table.ok());
   REQUIRE(study.rows.size() == 4);
   CHECK(study.formulation.omega == 10);  // MBSVT's
   for (std::size_t i = 1; i < 3; ++i) {
     const PenaltyStudyRow &before = study.rows[i - 1], &row = study.rows[i];
+    const TradeoffRow &run = study.table.rows[row.quasidefinite], &run_before = study.table.rows[before.quasidefinite];
     CHECK(before.model_error / row.model_error == Approx(100).epsilon(0.2));
     CHECK(row.rounding_error > 3 * before.rounding_error);
-    REQUIRE(row.quasidefinite.ok);
+    REQUIRE(run.ok());
     for (Eigen::Index q : {0, 2}) {  // motion, psi
-      CHECK(row.quasidefinite.errors(q) < 0.1 * before.quasidefinite.errors(q));
-      CHECK(before.rounding(q) < 1e-3 * before.quasidefinite.errors(q));
+      CHECK(run.errors(q) < 0.1 * run_before.errors(q));
+      CHECK(before.rounding(q) < 1e-3 * run_before.errors(q));
       CHECK(row.rounding(q) > before.rounding(q));
     }
-    CHECK(row.quasidefinite.statistics.max_position_violation <
-          0.1 * before.quasidefinite.statistics.max_position_violation);
+    CHECK(run.statistics.max_position_violation < 0.1 * run_before.statistics.max_position_violation);
   }
   const PenaltyStudyRow& extreme = study.rows.back();
   CHECK(extreme.rounding_error > 1e-4);
   CHECK(extreme.model_error < 1e-10);
   CHECK(study.rows[2].augmented_error < 1e-11);
-  CHECK(study.constrained.ok);
+  CHECK(study.table.rows.front().ok());
 }
