@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "optim/solver/equality_multipliers.hpp"
 
 namespace mbsopt {
 namespace {
 
-constexpr double kGuess = 1e-4;  // tolerance of a search that only gives a start to the next one
+constexpr double kGuess = 1e-4;        // tolerance of a search that only gives a start to the next one
+constexpr double kSameOptimum = 1e-4;  // of log L, which tells nothing below 1
+constexpr double kLinear = 1e-6;       // of a change of the residuals: errors of the integration
+constexpr double kFarApart = 0.1;      // a change of the residuals over their size that shows whether they are linear
 
 // Tukey's loss has no pull far out, so that a start there would find nothing: Huber's estimate comes first.
 template <class Estimate>
@@ -19,6 +23,28 @@ LeastSquaresResult estimates_of(const Loss& loss, const Eigen::VectorXd& start, 
   if (first.status == SolverStatus::failed || first.status == SolverStatus::stopped) return first;
   return estimate(loss, first.x);
 }
+
+// The stack with residuals that are linear about a solution: z = z* + J (x - x*), by the sigmas of the stack.
+class LinearStack : public LeastSquaresProblem {
+ public:
+  LinearStack(const ExperimentStack& stack, const LeastSquaresResult& about)
+      : LeastSquaresProblem(stack.variables(), stack.size), stack_(stack), about_(about), sigma_(stack.sigma()) {
+    x_lower = stack.x_lower, x_upper = stack.x_upper;
+    plain = stack.plain, parts = stack.parts;
+  }
+
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override {
+    point.z = about_.point.z + about_.point.z_x * (x - about_.x), point.z_x = about_.point.z_x;
+    const Eigen::ArrayXd factor = sigma_.cwiseQuotient(stack_.sigma()).array();
+    point.z.head(factor.size()).array() *= factor;
+    point.z_x.topRows(factor.size()).array().colwise() *= factor;
+  }
+
+ private:
+  const ExperimentStack& stack_;
+  const LeastSquaresResult& about_;
+  const Eigen::VectorXd sigma_;
+};
 
 }  // namespace
 
@@ -64,12 +90,39 @@ LeastSquaresResult FitSearch::best_without_sigmas(SigmaEstimation& sigmas, const
   std::vector<double> first = noise;
   for (std::size_t g = 0; g < first.size(); ++g)
     if (sigmas.is_given(g)) first[g] = given[g];
+  const std::optional<Eigen::VectorXd> known = released_if_linear(sigmas, free, first, x);
+  if (known && known->size() == 0) return free;
   sigmas.set(first);
-  LeastSquaresResult released = without_sigmas(sigmas, minimised(x, kGuess).x);
+  LeastSquaresResult released = without_sigmas(sigmas, known ? *known : minimised(x, kGuess).x);
   if (fit_.sigmas_are_estimated && sigmas.likelihood(released.point.z) < likelihood) return released;
   fit_.result.history.resize(rows), apart_.resize(rows);
   sigmas.set(found), fit_.sigmas_are_estimated = true;
   return free;
+}
+
+// If residuals are linear in the parameters, their derivatives at one optimum tell the other one: no simulation is
+// needed. They are linear if they explain those at the start, x. Returns the other optimum, empty if it is the same
+// one.
+std::optional<Eigen::VectorXd> FitSearch::released_if_linear(SigmaEstimation& sigmas, const LeastSquaresResult& free,
+                                                             const std::vector<double>& first,
+                                                             const Eigen::VectorXd& x) const {
+  const Eigen::VectorXd moved = x.cwiseMax(stack_.x_lower).cwiseMin(stack_.x_upper) - free.x;
+  const Eigen::VectorXd change = residuals_at_start() - free.point.z;
+  const bool is_linear = change.norm() > kFarApart * free.point.z.norm() &&
+                         (change - free.point.z_x * moved).norm() <= kLinear * change.norm();
+  if (!is_linear || stack_.equalities > 0) return std::nullopt;
+  LinearStack linear(stack_, free);
+  const std::vector<double> found = sigmas.sigmas();
+  sigmas.set(first);
+  LeastSquaresOptions solver = solver_options(fit_);
+  const Eigen::VectorXd guess = solve_least_squares(linear, free.x, solver).x;
+  linear.groups = sigmas.scale_groups();
+  const LeastSquaresResult released = solve_least_squares(linear, guess, solver);
+  LeastSquaresPoint same = free.point;
+  linear.evaluate(free.x, same);
+  const bool is_better = released.cost_final < linear.cost(same.z) - kSameOptimum;
+  sigmas.set(found);
+  return is_better ? released.x : Eigen::VectorXd();
 }
 
 LeastSquaresResult FitSearch::without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x) {

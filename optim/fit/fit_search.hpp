@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "optim/fit/experiment_stack.hpp"
@@ -29,6 +30,8 @@ class FitSearch {
   LeastSquaresResult estimate(const Loss& loss, const Eigen::VectorXd& x);
   LeastSquaresResult without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
   LeastSquaresResult best_without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
+  std::optional<Eigen::VectorXd> released_if_linear(SigmaEstimation& sigmas, const LeastSquaresResult& free,
+                                                    const std::vector<double>& first, const Eigen::VectorXd& x) const;
   LeastSquaresResult in_turn_with_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
   LeastSquaresResult minimised(const Eigen::VectorXd& x, double loosest = 0);  // tolerance: at least it
   double take(SigmaEstimation& sigmas, LeastSquaresResult& solution) const;

@@ -10,8 +10,8 @@
 // This likelihood may have several optima: one channel or record is explained well, and others are given up. None is
 // better than noise alone. So if a sigma is far above the noise of its channels, the fit converges again, first by the
 // given sigmas, or by those of the noise where none is given, then with free ones. The best likelihood counts.
-// Differences of a smooth signal m show the noise e: m_(i-1) - 2 m_i + m_(i+1) ~ e_(i-1) - 2 e_i + e_(i+1), of variance
-// 6 sigma^2.
+// Residuals that are linear in the parameters need no simulation for this. Differences of a smooth signal m show the
+// noise e: m_(i-1) - 2 m_i + m_(i+1) ~ e_(i-1) - 2 e_i + e_(i+1), of variance 6 sigma^2.
 //
 // With a loss other than the square, which has outliers in mind, sigma is 1.4826 times the median of |r| (normal noise
 // has that). Then fit and sigmas are found in turn, until no sigma changes any more.

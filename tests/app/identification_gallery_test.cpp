@@ -187,7 +187,7 @@ TEST_CASE("inverse dynamics: torques of the smoothed motion give the arm's numbe
   const auto result = identified(folder, "double_pendulum/inverse_dynamics",
                                  {"--set", "parameters.h1.value=0.6", "--set", "parameters.J1.value=0.4", "--set",
                                   "parameters.h2.value=0.05", "--set", "parameters.coulomb1.value=0.6"});
-  CHECK(result.at("optimizer").at("evaluations") <= 12);  // two searches: its own, and one from the given sigmas
+  CHECK(result.at("optimizer").at("evaluations") <= 5);
   const std::map<std::string, double> truth{{"h1", 0.25}, {"J1", 0.06},      {"h2", 0.16},
                                             {"J2", 0.05}, {"coulomb1", 0.1}, {"coulomb2", 0.08}};
   std::vector<std::string> starts;
