@@ -33,7 +33,7 @@
 #include "optim/fit/experiment.hpp"
 #include "optim/fit/fit_comparison.hpp"
 #include "optim/fit/identification.hpp"
-#include "optim/fit/parameter_profile.hpp"
+#include "optim/fit/profile_likelihood.hpp"
 #include "optim/fit/recovery.hpp"
 #include "optim/fit/start_residuals.hpp"
 #include "optim/fit/unknown_parameters.hpp"

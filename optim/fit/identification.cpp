@@ -16,7 +16,7 @@
 #include "optim/fit/fit_context.hpp"
 #include "optim/fit/fit_doubts.hpp"
 #include "optim/fit/fit_search.hpp"
-#include "optim/fit/parameter_profile.hpp"
+#include "optim/fit/profile_likelihood.hpp"
 #include "optim/fit/validation.hpp"
 #include "optim/fit/windows.hpp"
 #include "optim/machine/stopwatch.hpp"

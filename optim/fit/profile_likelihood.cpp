@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
+#include "core/expression/did_you_mean.hpp"
 #include "optim/solver/equality_multipliers.hpp"
 
 namespace mbsopt {
 namespace {
+
+using Point = ParameterProfile::Point;
 
 constexpr int kMostPoints = 30;       // on each side
 constexpr double kProfileStep = 0.5;  // of tau, aimed at
@@ -17,59 +21,19 @@ constexpr double kBeyond = 1.15;      // of the quantile: so far the profile is 
 constexpr double kCrossing = 1e-3;    // of the quantile
 constexpr int kSecants = 8;
 
-// The problem with one variable held.
-class OneHeld : public LeastSquaresProblem {
- public:
-  OneHeld(LeastSquaresProblem& whole, Eigen::Index held)
-      : LeastSquaresProblem(whole.variables() - 1, whole.size), whole_(whole), held_(held) {
-    x_lower = without(whole.x_lower), x_upper = without(whole.x_upper);
-    equalities = whole.equalities, plain = whole.plain, loss = whole.loss, parts = whole.parts;
-    for (Dependence& part : parts) {
-      std::erase(part.variables, held);
-      for (Eigen::Index& variable : part.variables) variable -= variable > held ? 1 : 0;
-    }
-    all_.z.resize(size), all_.z_x.resize(size, whole.variables());
-  }
-  void hold(double value) { value_ = value; }
-  Eigen::VectorXd without(const Eigen::VectorXd& x) const {
-    Eigen::VectorXd rest(x.size() - 1);
-    rest << x.head(held_), x.tail(x.size() - held_ - 1);
-    return rest;
-  }
-  Eigen::VectorXd with(const Eigen::VectorXd& rest) const {
-    Eigen::VectorXd x(rest.size() + 1);
-    x << rest.head(held_), value_, rest.tail(rest.size() - held_);
-    return x;
-  }
-  void evaluate(const Eigen::VectorXd& rest, LeastSquaresPoint& point) override {
-    all_.ok = true, all_.z.setZero(), all_.z_x.setZero();
-    whole_.evaluate(with(rest), all_);
-    point.ok = all_.ok, point.message = all_.message, point.z = all_.z;
-    point.z_x << all_.z_x.leftCols(held_), all_.z_x.rightCols(variables() - held_);
-  }
-
- private:
-  LeastSquaresProblem& whole_;
-  Eigen::Index held_;
-  double value_ = 0;
-  LeastSquaresPoint all_;
-};
-
 class Side {
  public:
-  Side(LeastSquaresProblem& problem, OneHeld& held, const ProfileOptions& options, const ProfilePoint& estimate,
-       double sign)
-      : problem_(problem), held_(held), options_(options), estimate_(estimate), sign_(sign) {}
+  Side(LeastSquaresProblem& problem, const ProfileOptions& options, const Point& estimate, double sign)
+      : problem_(problem), options_(options), estimate_(estimate), sign_(sign) {}
 
-  // Outward until tau is beyond the quantile, or a bound is met.
-  void walk() {
-    const double bound = sign_ < 0 ? problem_.x_lower(options_.variable) : problem_.x_upper(options_.variable);
+  // Outward until tau is beyond the quantile, or the bound of the variable is met.
+  void walk(double bound) {
     double step = options_.first_step;
-    ProfilePoint last = estimate_;
-    if (sign_ * (bound - last.x) <= 0) return end("the estimate is at its bound");
+    Point last = estimate_;
+    if (sign_ * (bound - last.value) <= 0) return end("the estimate is at its bound");
     while (static_cast<int>(points.size()) < kMostPoints) {
-      const bool at_bound = sign_ * (bound - last.x) <= step;
-      const std::optional<ProfilePoint> next = fitted(at_bound ? bound : last.x + sign_ * step, last);
+      const bool at_bound = sign_ * (bound - last.value) <= step;
+      const std::optional<Point> next = fitted(at_bound ? bound : last.value + sign_ * step, last);
       if (!next) return;
       points.push_back(*next);
       if (std::abs(next->tau) >= options_.quantile && !crossing) find_crossing(last, *next);
@@ -78,37 +42,28 @@ class Side {
         if (!crossing) end("the data do not exclude its bound");
         return;
       }
-      const double rise = std::abs(next->tau) - std::abs(last.tau), taken = std::abs(next->x - last.x);
+      const double rise = std::abs(next->tau) - std::abs(last.tau), taken = std::abs(next->value - last.value);
       step = taken * std::clamp(rise > 0 ? kProfileStep / rise : kLongest, 0.25, kLongest);
       last = *next;
     }
     if (!crossing) end("the data do not bound it in the range of the search");
   }
 
-  std::vector<ProfilePoint> points;  // outward
+  std::vector<Point> points;  // outward
   std::optional<double> crossing;
   std::string why_none;
 
  private:
   void end(const std::string& why) { why_none = why; }
 
-  std::optional<ProfilePoint> fitted(double x, const ProfilePoint& from) {
-    held_.hold(x);
-    ProfilePoint p;
-    p.x = x;
-    const Eigen::VectorXd start = held_.without(from.variables);
-    if (start.size() == 0) {
-      LeastSquaresPoint point;
-      point.z.setZero(held_.size), point.z_x.setZero(held_.size, 0);
-      held_.evaluate(start, point);
-      if (!point.ok) return end("it could not be evaluated there: " + point.message), std::nullopt;
-      p.cost = held_.cost(point.z), p.variables = held_.with(start);
-    } else {
-      const LeastSquaresResult fit = solve_with_equalities(held_, start, options_.solver);
-      if (fit.status == SolverStatus::failed || fit.status == SolverStatus::stopped)
-        return stopped_ = fit.status == SolverStatus::stopped, end(fit.message), std::nullopt;
-      p.cost = fit.cost_final, p.variables = held_.with(fit.x);
-    }
+  // All other variables are fitted, while equal bounds hold this one.
+  std::optional<Point> fitted(double x, const Point& from) {
+    const Eigen::Index k = options_.variable;
+    problem_.x_lower(k) = problem_.x_upper(k) = x;
+    const LeastSquaresResult fit = solve_with_equalities(problem_, from.parameters, options_.solver);
+    if (fit.status == SolverStatus::failed || fit.status == SolverStatus::stopped)
+      return stopped_ = fit.status == SolverStatus::stopped, end(fit.message), std::nullopt;
+    Point p{x, fit.cost_final, 0, fit.x};
     const double rise = p.cost - estimate_.cost;
     if (rise < -1e-6 * (estimate_.cost + options_.likelihood_scale)) {
       end(fmt::format("a better fit was met on the way, cost {:.9g} instead of {:.9g}: start from there", p.cost,
@@ -121,19 +76,19 @@ class Side {
   }
 
   // Where |tau| is the quantile, between the last point inside and the first one outside.
-  void find_crossing(ProfilePoint inside, ProfilePoint outside) {
+  void find_crossing(Point inside, Point outside) {
     for (int i = 0; i < kSecants && !stopped_; ++i) {
       const double a = std::abs(inside.tau), b = std::abs(outside.tau);
       const double part = (options_.quantile - a) / (b - a);
-      crossing = inside.x + part * (outside.x - inside.x);
+      crossing = inside.value + part * (outside.value - inside.value);
       if (b - a <= kCrossing * options_.quantile) return;
       // A secant stays a tenth away from either end; nearer ones would converge slowly.
-      const double x = inside.x + std::clamp(part, 0.1, 0.9) * (outside.x - inside.x);
-      const std::optional<ProfilePoint> next = fitted(i < 2 ? *crossing : x, inside);
+      const double x = inside.value + std::clamp(part, 0.1, 0.9) * (outside.value - inside.value);
+      const std::optional<Point> next = fitted(i < 2 ? *crossing : x, inside);
       if (!next) return;
       points.push_back(*next);
       if (std::abs(std::abs(next->tau) - options_.quantile) <= kCrossing * options_.quantile) {
-        crossing = next->x;
+        crossing = next->value;
         return;
       }
       (std::abs(next->tau) < options_.quantile ? inside : outside) = *next;
@@ -141,38 +96,84 @@ class Side {
   }
 
   LeastSquaresProblem& problem_;
-  OneHeld& held_;
   const ProfileOptions& options_;
-  const ProfilePoint& estimate_;
+  const Point& estimate_;
   double sign_;
   bool stopped_ = false;
 };
 
 }  // namespace
 
-Profile profile_likelihood(LeastSquaresProblem& problem, const Eigen::VectorXd& x, const ProfileOptions& options) {
-  OneHeld held(problem, options.variable);
+ParameterProfile profile_likelihood(LeastSquaresProblem& problem, const Eigen::VectorXd& x,
+                                    const ProfileOptions& options) {
   LeastSquaresPoint at;
   at.z.setZero(problem.size), at.z_x.setZero(problem.size, problem.variables());
   problem.evaluate(x, at);
-  Profile profile;
+  ParameterProfile profile;
   if (!at.ok) {
     profile.below = profile.above = "the estimate cannot be evaluated: " + at.message;
     return profile;
   }
-  const ProfilePoint estimate{x(options.variable), problem.cost(at.z), 0, x};
-  Side down(problem, held, options, estimate, -1), up(problem, held, options, estimate, 1);
-  for (Side* side : {&down, &up}) {
-    side->walk();
+  const Point estimate{x(options.variable), problem.cost(at.z), 0, x};
+  const double lower = problem.x_lower(options.variable), upper = problem.x_upper(options.variable);
+  Side down(problem, options, estimate, -1), up(problem, options, estimate, 1);
+  down.walk(lower), up.walk(upper);
+  problem.x_lower(options.variable) = lower, problem.x_upper(options.variable) = upper;
+  for (Side* side : {&down, &up})
     if (!side->crossing && side->why_none.empty()) side->why_none = "stopped on request";
-  }
   profile.points = down.points;
   profile.points.push_back(estimate);
   profile.points.insert(profile.points.end(), up.points.begin(), up.points.end());
-  std::sort(profile.points.begin(), profile.points.end(),
-            [](const ProfilePoint& a, const ProfilePoint& b) { return a.x < b.x; });
+  std::ranges::sort(profile.points, {}, &Point::value);
   profile.lower = down.crossing, profile.upper = up.crossing;
   profile.below = down.why_none, profile.above = up.why_none;
+  return profile;
+}
+
+std::vector<Eigen::Index> profiled_unknowns(const std::vector<std::string>& profiles,
+                                            const std::vector<std::string>& names) {
+  std::vector<Eigen::Index> indices;
+  for (const std::string& name : profiles) {
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+      throw std::invalid_argument(fmt::format("--profile: '{}' is not fitted{}; fitted are {}", name,
+                                              did_you_mean(name, names), joined(names)));
+    indices.push_back(found - names.begin());
+  }
+  return indices;
+}
+
+ParameterProfile profile_of(FitContext& fit, ExperimentStack& stack, Eigen::Index k, const Eigen::VectorXd& x) {
+  const FitStatistics& s = fit.result.statistics;
+  const std::string& name = fit.result.parameters[static_cast<std::size_t>(k)].name;
+  ProfileOptions options;
+  options.variable = k;
+  // If the linear model gives no standard error, the first step is a hundredth of the variable.
+  const double std_error = s.std_error(k) / std::abs(stack.scaling().rho_x(x)(k));
+  const bool sensible = std::isfinite(std_error) && std_error > 0;
+  options.first_step = sensible ? 0.5 * std_error : 0.01 * std::max(1.0, std::abs(x(k)));
+  // Correlated residuals: Chandler and Bate, Biometrika 94 (2007) 167, equation 6.
+  options.likelihood_scale = s.likelihood_scale * s.inflation(k), options.quantile = s.quantile;
+  options.solver = solver_options(fit);
+  if (!(s.likelihood_scale > 0) || !std::isfinite(s.likelihood_scale) || !std::isfinite(s.quantile)) {
+    const std::string none = "the residuals have no variance to measure it by";
+    return {name, {}, {}, {}, none, none};
+  }
+  const auto value_at = [&](double x_k) {
+    Eigen::VectorXd at = x;
+    at(k) = x_k;
+    return stack.scaling().to_rho(at)(k);
+  };
+  options.progress = [&](const Point& p) {
+    if (!fit.abandoned && fit.options.profile_progress)
+      fit.abandoned = !fit.options.profile_progress(name, value_at(p.value), p.tau);
+    return !fit.abandoned;
+  };
+  ParameterProfile profile = profile_likelihood(stack, x, options);
+  profile.name = name;
+  for (Point& p : profile.points) p.value = value_at(p.value), p.parameters = stack.scaling().to_rho(p.parameters);
+  for (std::optional<double>* end : {&profile.lower, &profile.upper})
+    if (*end) *end = value_at(**end);
   return profile;
 }
 

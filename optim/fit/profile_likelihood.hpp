@@ -8,31 +8,19 @@
 // gives the next x. Secants find the ends of the interval to 1e-3 of the quantile.
 //
 //   ProfileOptions options{.variable = 0, .first_step = std_error, .likelihood_scale = s2, .quantile = 1.96};
-//   const Profile profile = profile_likelihood(problem, x_hat, options);
+//   const ParameterProfile profile = profile_likelihood(problem, x_hat, options);
 //   if (profile.lower) std::cout << *profile.lower;           // else the data do not bound it below
 #pragma once
 
 #include <Eigen/Core>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "optim/solver/levenberg_marquardt.hpp"
+#include "optim/fit/experiment_stack.hpp"
+#include "optim/fit/fit_context.hpp"
 
 namespace mbsopt {
-
-struct ProfilePoint {
-  double x = 0;  // of the variable
-  double cost = 0, tau = 0;
-  Eigen::VectorXd variables;  // all, fitted
-};
-
-struct Profile {
-  std::vector<ProfilePoint> points;    // by rising x; the estimate among them
-  std::optional<double> lower, upper;  // of the 95 % interval, in x
-  std::string below, above;            // why there is none
-};
 
 struct ProfileOptions {
   Eigen::Index variable = 0;
@@ -40,11 +28,19 @@ struct ProfileOptions {
   double likelihood_scale = 1;  // v > 0
   double quantile = 1.96;
   LeastSquaresOptions solver;
-  std::function<bool(const ProfilePoint&)> progress;  // after every point; false stops
+  std::function<bool(const ParameterProfile::Point&)> progress;  // after every point; false stops
 };
 
-// x: the estimate. A point better than it (the fit was in a local minimum, or not at its end) is said so in below or
-// above.
-Profile profile_likelihood(LeastSquaresProblem& problem, const Eigen::VectorXd& x, const ProfileOptions& options);
+// x: the estimate; values and ends of the profile are those of the variable. A point better than the estimate (the fit
+// was in a local minimum, or not at its end) is said so in below or above.
+ParameterProfile profile_likelihood(LeastSquaresProblem& problem, const Eigen::VectorXd& x,
+                                    const ProfileOptions& options);
+
+// Indices of the profiled parameters among all fitted names. Throws std::invalid_argument for one that is not fitted.
+std::vector<Eigen::Index> profiled_unknowns(const std::vector<std::string>& profiles,
+                                            const std::vector<std::string>& names);
+
+// The profile of fitted parameter k at the solution x.
+ParameterProfile profile_of(FitContext& fit, ExperimentStack& stack, Eigen::Index k, const Eigen::VectorXd& x);
 
 }  // namespace mbsopt

@@ -54,18 +54,18 @@ TEST_CASE("the profile of a linear model is a straight line, its interval that o
     ProfileOptions options;
     options.variable = k, options.first_step = 0.5 * s.std_error(k);
     options.likelihood_scale = s.residual_variance, options.quantile = s.quantile;
-    const Profile profile = profile_likelihood(line, x, options);
+    const ParameterProfile profile = profile_likelihood(line, x, options);
     REQUIRE(profile.points.size() > 8);
-    for (const ProfilePoint& p : profile.points) {
-      CHECK(p.tau == Approx((p.x - x(k)) / s.std_error(k)).margin(1e-6));
-      CHECK(p.variables(k) == p.x);
+    for (const ParameterProfile::Point& p : profile.points) {
+      CHECK(p.tau == Approx((p.value - x(k)) / s.std_error(k)).margin(1e-6));
+      CHECK(p.parameters(k) == p.value);
     }
     REQUIRE(profile.lower);
     REQUIRE(profile.upper);
     CHECK(*profile.lower == Approx(s.ci95(k, 0)).epsilon(1e-4));
     CHECK(*profile.upper == Approx(s.ci95(k, 1)).epsilon(1e-4));
-    CHECK(profile.points.front().x < *profile.lower);
-    CHECK(profile.points.back().x > *profile.upper);
+    CHECK(profile.points.front().value < *profile.lower);
+    CHECK(profile.points.back().value > *profile.upper);
   }
 }
 
@@ -74,7 +74,7 @@ TEST_CASE("the profile of a nonlinear model is not symmetric, and its ends are w
   const LeastSquaresResult fit = solve_least_squares(decay, VectorXd::Constant(1, 1));
   ProfileOptions options;
   options.first_step = 0.1;
-  const Profile profile = profile_likelihood(decay, fit.x, options);
+  const ParameterProfile profile = profile_likelihood(decay, fit.x, options);
   REQUIRE(profile.lower);
   REQUIRE(profile.upper);
   const double rise = 0.5 * 1.96 * 1.96;
@@ -89,7 +89,7 @@ TEST_CASE("where the data do not bound a parameter, the profile says so", "[prof
   const LeastSquaresResult fit = solve_least_squares(fast, VectorXd::Constant(1, 3));
   ProfileOptions options;
   options.first_step = 0.2;
-  const Profile open = profile_likelihood(fast, fit.x, options);
+  const ParameterProfile open = profile_likelihood(fast, fit.x, options);
   CHECK(open.lower);
   CHECK_FALSE(open.upper);
   CHECK_THAT(open.above, Contains("do not bound it"));
@@ -104,6 +104,6 @@ TEST_CASE("a profile that meets a better fit says so", "[profile]") {
   Decay decay((VectorXd(3) << 0.40, 0.10, 0.05).finished());
   ProfileOptions options;
   options.first_step = 0.2;
-  const Profile profile = profile_likelihood(decay, VectorXd::Constant(1, 3), options);  // no fit at all
+  const ParameterProfile profile = profile_likelihood(decay, VectorXd::Constant(1, 3), options);  // no fit at all
   CHECK_THAT(profile.below, Contains("a better fit was met on the way"));
 }
