@@ -31,11 +31,10 @@
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
 #include "optim/fit/experiment.hpp"
-#include "optim/fit/fit_comparison.hpp"
+#include "optim/fit/fit_start.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/profile_likelihood.hpp"
 #include "optim/fit/recovery.hpp"
-#include "optim/fit/start_residuals.hpp"
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/fit/windows.hpp"
 #include "optim/problem/unused_parameters.hpp"
@@ -212,14 +211,18 @@ void check(Run& run, OtherModel& other) {
   if (options.preflight) run.warn("--compare: is skipped by --preflight, which fits nothing");
 }
 
-// Residuals at the initial values; for --preflight with what the data determine there.
+// Residuals at the initial values, whose derivatives are doubted on the way; for --preflight with what the data
+// determine there.
 IdentificationResult at_start(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
-  IdentificationOptions options = simulating(run);
-  options.preflight = run.context.options.preflight;
-  IdentificationResult start =
-      options.preflight ? run_identification(needed, data, options) : residuals_at_start(needed, data, options);
+  IdentificationOptions options;
+  options.threads = case_threads(run), options.simulation_progress = [](double) { return !interrupted(); };
+  FitStart start = start_of_fit(needed, data, options);
+  for (const std::string& warning : start.doubts) run.warn(warning);
+  if (!run.context.options.preflight) return std::move(start.residuals);
+  options = simulating(run), options.preflight = true;
+  start.residuals = run_identification(needed, data, options);
   run.progress.finish();
-  return start;
+  return std::move(start.residuals);
 }
 
 void say_channels(Run& run, const Problem& cut, const std::vector<CsvTable>& data, const IdentificationResult& start) {
@@ -401,10 +404,8 @@ int identify_command(const CommandContext& context) {
     for (const std::string& warning : cut.warnings) run.warn(warning);
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
-  const FitComparisonOptions compared{{}, [](double) { return !interrupted(); }, case_threads(run)};
-  for (const std::string& warning : doubts_about_fit(needed, data, compared)) run.warn(warning);
-  if (other) check(run, *other);
   const IdentificationResult start = at_start(run, needed, data);
+  if (other) check(run, *other);
   say_channels(run, needed, data, start);
   if (context.options.preflight) return preflight(run, start);
   LongRun long_run(run);

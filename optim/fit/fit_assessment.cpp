@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "optim/fit/experiment_influence.hpp"
-#include "optim/fit/scored_experiment.hpp"
 
 namespace mbsopt {
 namespace {
@@ -43,12 +42,52 @@ void set_interval(FittedParameter& f, double half, bool logarithmic) {
 
 }  // namespace
 
+void name_experiments(FitContext& fit) {
+  fit.result.experiments.resize(fit.spec.experiments.size());
+  for (std::size_t e = 0; e < fit.spec.experiments.size(); ++e)
+    fit.result.experiments[e].name = fit.spec.experiments[e].name,
+    fit.result.experiments[e].validate = fit.spec.experiments[e].validate;
+}
+
+void score_experiment(FitContext& fit, const ExperimentStack::Member& member, const Eigen::VectorXd& z,
+                      bool estimated) {
+  const ExperimentSpec& spec = fit.spec.experiments[member.experiment];
+  const Experiment& model = member.model;
+  ExperimentFit& scored = fit.result.experiments[member.experiment];
+  scored.window = spec.origin;
+  scored.start_time = model.start_time(), scored.end_time = model.end_time();
+  scored.samples = model.samples().size();
+  std::vector<std::vector<double>> by_channel(spec.channels.size());
+  for (std::size_t i = 0; i < scored.samples; ++i) {
+    const Experiment::Sample& sample = model.samples()[i];
+    const double z_i = z(static_cast<Eigen::Index>(i)), residual = z_i * model.sigma(sample.channel);
+    by_channel[sample.channel].push_back(z_i);
+    fit.result.residuals.push_back({member.experiment, sample.channel, model.times()[sample.time], sample.measured,
+                                    sample.measured - residual, z_i});
+  }
+  scored.channels.clear();
+  double squares = 0;
+  for (std::size_t c = 0; c < spec.channels.size(); ++c) {
+    const Eigen::Map<const Eigen::VectorXd> z_c(by_channel[c].data(), static_cast<Eigen::Index>(by_channel[c].size()));
+    ChannelFit& channel = scored.channels.emplace_back();
+    channel.column = spec.channels[c].column, channel.sensor = spec.channels[c].sensor;
+    channel.samples = by_channel[c].size(), channel.missing = model.missing(c);
+    channel.sigma = model.sigma(c);
+    channel.sigma_is_estimated = estimated && spec.channels[c].estimate_sigma != SigmaEstimate::none;
+    channel.rms_scaled = z_c.norm() / std::sqrt(std::max(1.0, static_cast<double>(z_c.size())));
+    channel.rms = channel.sigma * channel.rms_scaled;
+    channel.beyond_scale = static_cast<std::size_t>((z_c.array().abs() > fit.spec.loss.s()).count());
+    channel.analysis = analyse_residuals(z_c);
+    squares += static_cast<double>(z_c.size()) * channel.rms * channel.rms;
+  }
+  scored.rms = std::sqrt(squares / static_cast<double>(scored.samples));
+}
+
 void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated) {
   Eigen::Index row = 0;
   for (const ExperimentStack::Member& m : stack.members()) {
     const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
-    score_experiment(fit.spec.experiments[m.experiment], m.model, fit.spec.loss, z.segment(row, n), estimated,
-                     m.experiment, fit.result.experiments[m.experiment], fit.result.residuals);
+    score_experiment(fit, m, z.segment(row, n), estimated);
     row += n;
   }
 }

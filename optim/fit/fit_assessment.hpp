@@ -12,7 +12,12 @@
 
 namespace mbsopt {
 
-// Scores the experiments of the stack, and appends their rows of residuals to the result.
+// Sets the names of all experiments in the result, also of those that cannot be scored.
+void name_experiments(FitContext& fit);
+// Scores an experiment by its residuals z channel by channel, and appends its rows of residuals to the result.
+// estimated: whether the fit has estimated sigmas.
+void score_experiment(FitContext& fit, const ExperimentStack::Member& member, const Eigen::VectorXd& z, bool estimated);
+// The same of all experiments of the stack.
 void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated);
 
 // Statistics of the parameters by the samples and the priors at a solution. The experiments of the stack must be

@@ -2,6 +2,8 @@
 
 #include <optional>
 
+#include "optim/problem/parameter_values.hpp"
+
 namespace mbsopt {
 
 LeastSquaresOptions solver_options(const FitContext& fit) {
@@ -18,6 +20,14 @@ ExperimentStack::Member member(const FitContext& fit, std::size_t e, const Eigen
           Experiment(fit.scene, fit.spec.experiments[e], place_of(fit.spec, e), fit.data[e], rho,
                      unknowns_in(fit.scene, fit.spec, e, unknowns), fit.options.user_forces),
           origin && origin->continues, origin && origin->number > 1};
+}
+
+std::vector<ExperimentStack::Member> fitted_members(const FitContext& fit,
+                                                    const std::vector<UnknownParameter>& unknowns) {
+  std::vector<ExperimentStack::Member> members;
+  for (std::size_t e = 0; e < fit.spec.experiments.size(); ++e)
+    if (!fit.spec.experiments[e].validate) members.push_back(member(fit, e, parameter_values(fit.scene), unknowns));
+  return members;
 }
 
 }  // namespace mbsopt

@@ -32,4 +32,8 @@ LeastSquaresOptions solver_options(const FitContext& fit);
 ExperimentStack::Member member(const FitContext& fit, std::size_t experiment, const Eigen::VectorXd& rho,
                                const std::vector<UnknownParameter>& unknowns);
 
+// All that are fitted.
+std::vector<ExperimentStack::Member> fitted_members(const FitContext& fit,
+                                                    const std::vector<UnknownParameter>& unknowns);
+
 }  // namespace mbsopt

@@ -72,11 +72,7 @@ class Identification {
   void search() {
     const std::vector<UnknownParameter> unknowns = unknowns_of_fit(fit_.scene, fit_.spec);
     const VariableScaling scaling = scaling_of(unknowns);
-    std::vector<ExperimentStack::Member> members;
-    for (std::size_t e = 0; e < fit_.spec.experiments.size(); ++e)
-      if (!fit_.spec.experiments[e].validate)
-        members.push_back(member(fit_, e, parameter_values(fit_.scene), unknowns));
-    ExperimentStack stack(std::move(members), unknowns, scaling, fit_.spec.loss);
+    ExperimentStack stack(fitted_members(fit_, unknowns), unknowns, scaling, fit_.spec.loss);
     stack.go_on = fit_.go_on, stack.records = fit_.options.records, stack.threads = fit_.options.threads;
     if (stack.size < stack.variables())
       throw std::invalid_argument(fmt::format("identification: {} cannot determine {}",
@@ -89,7 +85,7 @@ class Identification {
     fit_.result.message = fit_.abandoned ? "stopped on request" : solution.message;
     search.measure_costs_by_the_end(solution.cost_final);
     fit_.result.samples = static_cast<std::size_t>(stack.samples());
-    fit_.result.experiments.resize(fit_.spec.experiments.size());
+    name_experiments(fit_);
     const Eigen::VectorXd values = scaling.to_rho(solution.x);
     const bool usable = solution.point.z.size() > 0;
     if (usable) {
@@ -180,10 +176,6 @@ class Identification {
   void order_residuals() {
     std::stable_sort(fit_.result.residuals.begin(), fit_.result.residuals.end(),
                      [](const ResidualRow& a, const ResidualRow& b) { return a.experiment < b.experiment; });
-    for (std::size_t e = 0; e < fit_.result.experiments.size(); ++e) {  // also those that could not be scored
-      fit_.result.experiments[e].name = fit_.spec.experiments[e].name;
-      fit_.result.experiments[e].validate = fit_.spec.experiments[e].validate;
-    }
   }
 
   FitContext fit_;

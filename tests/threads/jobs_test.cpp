@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "optim/fit/fit_comparison.hpp"
+#include "optim/fit/fit_start.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
 #include "optim/objective/case_evaluator.hpp"
@@ -54,9 +54,11 @@ TEST_CASE("doubts about a fit are the same in any number of threads", "[threads]
   kick.body = "arm", kick.components = {f("0"), f("0"), f("1e-3*abs(t - tp)/(t - tp)")};
   problem.scene.forces.push_back({"kick", kick});
   const std::vector<CsvTable> data{pendulum::exact_motion(50, 0.5, 2.5, 0, 1)};
-  const std::vector<std::string> one = doubts_about_fit(problem, data);
+  const std::vector<std::string> one = start_of_fit(problem, data).doubts;
   CHECK_FALSE(one.empty());
-  CHECK(doubts_about_fit(problem, data, {.threads = 4}) == one);
+  IdentificationOptions four;
+  four.threads = 4;
+  CHECK(start_of_fit(problem, data, four).doubts == one);
 }
 
 TEST_CASE("a bootstrap of residuals has the scatter of the standard errors, in any number of threads",
