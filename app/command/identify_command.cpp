@@ -55,24 +55,17 @@ void add_gap(std::vector<double>& times, double next, std::initializer_list<std:
 std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTable>& data,
                                const IdentificationResult& fit, const IdentificationResult& start) {
   std::vector<FitPlot> plots;
-  std::vector<std::size_t> first;  // plot of each experiment's first channel
-  const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
-  for (std::size_t e = 0; e < experiments.size(); ++e) {
-    const ExperimentSpec& experiment = experiments[e];
-    if (e > 0 && experiment.origin && record_name(experiment) == record_name(experiments[e - 1])) {
-      first.push_back(first.back());
-      continue;
-    }
-    first.push_back(plots.size());
-    for (const ChannelSpec& channel : experiment.channels)
-      plots.push_back({.experiment = record_name(experiment),
-                       .channel = without_unit(channel.column),
-                       .unit = unit_of_channel(problem.scene, channel, data[e]),
-                       .validates = experiment.validate});
+  const RecordChannels channels = record_channels(*problem.identification);
+  for (const auto& [e, c] : channels.all) {
+    const ExperimentSpec& experiment = problem.identification->experiments[e];
+    plots.push_back({.experiment = record_name(experiment),
+                     .channel = without_unit(experiment.channels[c].column),
+                     .unit = unit_of_channel(problem.scene, experiment.channels[c], data[e]),
+                     .validates = experiment.validate});
   }
   std::vector<std::optional<std::size_t>> last(plots.size()), last_at_start(plots.size());  // experiment of a plot
   for (const ResidualRow& row : fit.residuals) {
-    const std::size_t k = first[row.experiment] + row.channel;
+    const std::size_t k = channels.first[row.experiment] + row.channel;
     FitPlot& plot = plots[k];
     if (last[k] && last[k] != row.experiment)
       add_gap(plot.times, row.t, {&plot.measured, &plot.model, &plot.residual, &plot.prediction});
@@ -84,7 +77,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTabl
     plot.prediction.push_back(row.prediction);
   }
   for (const ResidualRow& row : start.residuals) {
-    const std::size_t k = first[row.experiment] + row.channel;
+    const std::size_t k = channels.first[row.experiment] + row.channel;
     FitPlot& plot = plots[k];
     if (last_at_start[k] && last_at_start[k] != row.experiment) add_gap(plot.initial_times, row.t, {&plot.initial});
     last_at_start[k] = row.experiment;
@@ -227,7 +220,7 @@ IdentificationResult at_start(Run& run, const Problem& needed, const std::vector
 
 void say_channels(Run& run, const Problem& cut, const std::vector<CsvTable>& data, const IdentificationResult& start) {
   std::vector<ChannelData> channels = channel_data(cut, data);
-  add_residuals(channels, start);
+  add_residuals(channels, cut, start);
   run.context.out << '\n' << channel_table(channels);
   run.result["preflight"]["channels"] = to_json(channels);
 }
@@ -277,17 +270,6 @@ SimulatedExperiment simulated_experiment(Run& run, Scene scene) {
   return motion;
 }
 
-// The problem with the fitted values in place of the starting ones.
-Problem fitted_problem(Problem problem, const IdentificationResult& fit) {
-  for (const FittedParameter& p : fit.parameters) {
-    for (Parameter& shared : problem.scene.parameters)
-      if (p.experiment.empty() && shared.name == p.parameter) shared.value = p.value;
-    for (ExperimentSpec& e : problem.identification->experiments)
-      if (e.name == p.experiment) e.overrides.emplace_back(p.parameter, p.value);
-  }
-  return problem;
-}
-
 // Residuals are derived along with the motion, by runs that do not report their steps. So this runs one that does.
 SimulatedExperiment simulate_first_experiment(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
   SimulatedExperiment experiment = simulated_experiment(run, simulated_scene(needed, data));
@@ -333,7 +315,7 @@ struct FittedMotion {
 FittedMotion fitted_motion(Run& run, const Problem& needed, const std::vector<CsvTable>& data,
                            const IdentificationResult& fit) {
   FittedMotion motion;
-  const Problem fitted = fitted_problem(needed, fit);
+  const Problem fitted = with_fitted_values(needed, fit);
   motion.after = simulated_experiment(run, simulated_scene(fitted, data));
   run.progress.finish();
   motion.measured = measured_points(fitted, motion.after->scene, fit);

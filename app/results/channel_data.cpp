@@ -48,23 +48,23 @@ std::string unit_of_channel(const Scene& scene, const ChannelSpec& channel, cons
 std::vector<ChannelData> channel_data(const Problem& problem, const std::vector<CsvTable>& data) {
   const IdentificationSpec& spec = *problem.identification;
   const std::vector<UnknownParameter> of_fit = unknowns_of_fit(problem.scene, spec);
+  const RecordChannels record = record_channels(spec);
   std::vector<RecordedChannel> columns;
-  std::size_t first = 0;  // column of the experiment's first channel
+  for (const auto& [e, c] : record.all) {
+    const ExperimentSpec& experiment = spec.experiments[e];
+    columns.push_back({{.experiment = record_name(experiment),
+                        .column = experiment.channels[c].column,
+                        .unit = unit_of_channel(problem.scene, experiment.channels[c], data[e]),
+                        .validates = experiment.validate},
+                       {},
+                       {}});
+  }
   for (std::size_t e = 0; e < spec.experiments.size(); ++e) {
     const ExperimentSpec& experiment = spec.experiments[e];
     const auto& unknowns = experiment.validate ? free_in(problem.scene, spec, e) : of_fit;
     const Experiment model(problem.scene, experiment, place_of(spec, e), data[e], parameter_values(problem.scene),
                            unknowns_in(problem.scene, spec, e, unknowns));  // whose bounds say how far a delay reaches
-    if (e == 0 || record_name(experiment) != record_name(spec.experiments[e - 1])) {
-      first = columns.size();
-      for (const ChannelSpec& channel : experiment.channels)
-        columns.push_back({{.experiment = record_name(experiment),
-                            .column = channel.column,
-                            .unit = unit_of_channel(problem.scene, channel, data[e]),
-                            .validates = experiment.validate},
-                           {},
-                           {}});
-    }
+    const std::size_t first = record.first[e];
     for (std::size_t c = 0; c < model.channels(); ++c) columns[first + c].data.missing += model.missing(c);
     for (const Experiment::Sample& sample : model.samples()) {
       columns[first + sample.channel].times.push_back(model.times()[sample.time]);
@@ -79,20 +79,11 @@ std::vector<ChannelData> channel_data(const Problem& problem, const std::vector<
   return channels;
 }
 
-void add_residuals(std::vector<ChannelData>& channels, const IdentificationResult& start) {
-  std::vector<std::vector<std::size_t>> place;  // of each channel of each experiment
-  for (const ExperimentFit& experiment : start.experiments) {
-    const std::string& name = experiment.window ? experiment.window->experiment : experiment.name;
-    std::vector<std::size_t>& of = place.emplace_back();
-    for (const ChannelFit& channel : experiment.channels) {
-      const auto found = std::ranges::find_if(
-          channels, [&](const ChannelData& d) { return d.experiment == name && d.column == channel.column; });
-      of.push_back(static_cast<std::size_t>(found - channels.begin()));
-    }
-  }
+void add_residuals(std::vector<ChannelData>& channels, const Problem& problem, const IdentificationResult& start) {
+  const std::vector<std::size_t> first = record_channels(*problem.identification).first;
   std::vector<double> squares(channels.size()), samples(channels.size());
   for (const ResidualRow& row : start.residuals) {
-    const std::size_t k = place[row.experiment][row.channel];
+    const std::size_t k = first[row.experiment] + row.channel;
     squares[k] += row.scaled * row.scaled, ++samples[k];
   }
   for (std::size_t k = 0; k < channels.size(); ++k)

@@ -1,7 +1,7 @@
 // Says what the columns of an identification hold before the fit. Windows of one experiment are one record.
 //
 //   std::vector<ChannelData> channels = channel_data(problem, data);   // problem: cut into windows, data: of these
-//   add_residuals(channels, start);                                    // start: residuals_at_start, or a preflight
+//   add_residuals(channels, problem, start);                           // start: start_of_fit, or a preflight
 //   std::cout << channel_table(channels);
 #pragma once
 
@@ -25,7 +25,7 @@ struct ChannelData {
 };
 
 std::vector<ChannelData> channel_data(const Problem& problem, const std::vector<CsvTable>& data);
-void add_residuals(std::vector<ChannelData>& channels, const IdentificationResult& start);
+void add_residuals(std::vector<ChannelData>& channels, const Problem& problem, const IdentificationResult& start);
 
 std::string channel_table(const std::vector<ChannelData>& channels);
 Json to_json(const std::vector<ChannelData>& channels);

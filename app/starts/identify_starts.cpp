@@ -8,6 +8,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "optim/fit/nearest_turn.hpp"
 #include "optim/fit/sigma_estimation.hpp"
+#include "optim/fit/unknown_parameters.hpp"
 #include "optim/problem/logged_columns.hpp"
 #include "optim/problem/start_points.hpp"
 
@@ -57,22 +58,13 @@ Json record_of_start(const Problem& problem, const std::vector<CsvTable>& data, 
   return record;
 }
 
-void override_value(ExperimentSpec& experiment, const std::string& parameter, double value) {
-  const auto found = std::find_if(experiment.overrides.begin(), experiment.overrides.end(),
-                                  [&](const auto& entry) { return entry.first == parameter; });
-  if (found != experiment.overrides.end())
-    found->second = value;
-  else
-    experiment.overrides.emplace_back(parameter, value);
-}
-
 Problem at_fit(const Problem& problem, const Json& record) {
   Problem fitted = with_values(problem, record.value("parameters", Json::object()));
   const Json overrides = record.value("overrides", Json::object());
   for (ExperimentSpec& experiment : fitted.identification->experiments) {
     if (!overrides.contains(experiment.name)) continue;
     for (const auto& [name, value] : overrides[experiment.name].items())
-      override_value(experiment, name, value.get<double>());
+      set_override(experiment, name, value.get<double>());
   }
   return fitted;
 }

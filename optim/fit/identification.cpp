@@ -229,4 +229,14 @@ IdentificationResult run_identification(const Problem& problem, const std::vecto
   return result;
 }
 
+Problem with_fitted_values(Problem problem, const IdentificationResult& fit) {
+  for (const FittedParameter& p : fit.parameters) {
+    for (Parameter& shared : problem.scene.parameters)
+      if (p.experiment.empty() && shared.name == p.parameter) shared.value = p.value;
+    for (ExperimentSpec& e : problem.identification->experiments)
+      if (e.name == p.experiment) set_override(e, p.parameter, p.value);
+  }
+  return problem;
+}
+
 }  // namespace mbsopt

@@ -31,4 +31,7 @@ namespace mbsopt {
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options = {});
 
+// The problem with the fitted values in place of those from which the fit starts.
+Problem with_fitted_values(Problem problem, const IdentificationResult& fit);
+
 }  // namespace mbsopt

@@ -9,35 +9,32 @@
 #include <utility>
 
 #include "optim/fit/score_variance.hpp"
+#include "optim/fit/unknown_parameters.hpp"
 #include "optim/machine/on_threads.hpp"
 
 namespace mbsopt {
 namespace {
 
 // One channel of a motion: where its samples stand in the tables, what the model says there, and what it leaves.
-struct ChannelRecord {
+struct ResampledChannel {
   std::size_t column;
   std::vector<std::pair<std::size_t, std::size_t>> rows;  // tables, and rows of these
   std::vector<double> model, noise;
 };
 
-std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<CsvTable>& data,
-                                      const IdentificationResult& fit) {
+std::vector<ResampledChannel> records_of(const Problem& problem, const std::vector<CsvTable>& data,
+                                         const IdentificationResult& fit) {
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
-  std::vector<ChannelRecord> records;
-  std::vector<std::size_t> first;  // record of each experiment's first channel
-  for (std::size_t e = 0; e < experiments.size(); ++e) {
-    const bool follows = experiments[e].origin && experiments[e].origin->number > 1;  // a window of one motion
-    first.push_back(follows ? first.back() : records.size());
-    for (std::size_t c = 0; !follows && c < experiments[e].channels.size(); ++c)
-      records.push_back({data[e].find_column(experiments[e].channels[c].column), {}, {}, {}});
-  }
+  const RecordChannels channels = record_channels(*problem.identification);
+  std::vector<ResampledChannel> records;
+  for (const auto& [e, c] : channels.all)
+    records.push_back({data[e].find_column(experiments[e].channels[c].column), {}, {}, {}});
   std::size_t row = 0, experiment = 0;
   for (const ResidualRow& sample : fit.residuals) {  // by experiment, then time
     if (sample.experiment != experiment) experiment = sample.experiment, row = 0;
     const std::vector<double>& t = data[experiment].column(experiments[experiment].time);
     while (row + 1 < t.size() && t[row] < sample.t) ++row;
-    ChannelRecord& record = records[first[experiment] + sample.channel];
+    ResampledChannel& record = records[channels.first[experiment] + sample.channel];
     record.rows.emplace_back(experiment, row);
     record.model.push_back(sample.model), record.noise.push_back(sample.measured - sample.model);
   }
@@ -46,7 +43,7 @@ std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<
   const double N = static_cast<double>(fit.samples);
   const double left = static_cast<double>(fit.statistics.degrees_of_freedom - priors);
   const double larger = left > 0 ? std::sqrt(N / left) : 1;
-  for (ChannelRecord& record : records) {
+  for (ResampledChannel& record : records) {
     if (record.noise.empty()) continue;
     const double mean =
         Eigen::Map<const Eigen::ArrayXd>(record.noise.data(), static_cast<Eigen::Index>(record.noise.size())).mean();
@@ -55,7 +52,7 @@ std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<
   return records;
 }
 
-void simulate_noise(const ChannelRecord& record, std::size_t block, std::mt19937& generator,
+void simulate_noise(const ResampledChannel& record, std::size_t block, std::mt19937& generator,
                     std::vector<CsvTable>& tables) {
   const std::size_t n = record.rows.size();
   std::size_t from = 0;
@@ -76,22 +73,6 @@ void keep_fitted(Problem& problem, std::vector<CsvTable>& data) {
     }
 }
 
-}  // namespace
-
-namespace {
-
-void start_at(const IdentificationResult& fit, Problem& problem) {
-  for (const FittedParameter& p : fit.parameters) {
-    for (Parameter& shared : problem.scene.parameters)
-      if (p.experiment.empty() && shared.name == p.parameter) shared.value = p.value;
-    for (ExperimentSpec& e : problem.identification->experiments)
-      if (e.name == p.experiment) {
-        std::erase_if(e.overrides, [&](const auto& entry) { return entry.first == p.parameter; });
-        e.overrides.emplace_back(p.parameter, p.value);
-      }
-  }
-}
-
 // Interpolates linearly between the order statistics.
 double percentile(std::vector<double>& values, double part) {
   std::ranges::sort(values);
@@ -104,7 +85,7 @@ double percentile(std::vector<double>& values, double part) {
 
 Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationResult& fit,
                  const RecoveryOptions& options) {
-  const std::vector<ChannelRecord> records = records_of(problem, data, fit);
+  const std::vector<ResampledChannel> records = records_of(problem, data, fit);
   const bool in_blocks = options.bootstrap || fit.statistics.covariance_type != CovarianceType::white;
   std::mutex told;
   std::atomic<bool> stopped = false;
@@ -114,14 +95,13 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
     if (stopped) return;
     std::mt19937 generator(static_cast<unsigned>(job + 1));
     std::vector<CsvTable> simulated = data;
-    for (const ChannelRecord& record : records) {
+    for (const ResampledChannel& record : records) {
       const double blocks = in_blocks ? kLagPart : 0;
       const std::size_t block =
           std::max<std::size_t>(1, static_cast<std::size_t>(blocks * static_cast<double>(record.rows.size())));
       simulate_noise(record, block, generator, simulated);
     }
-    Problem again = problem;
-    if (options.bootstrap) start_at(fit, again);
+    Problem again = options.bootstrap ? with_fitted_values(problem, fit) : problem;
     keep_fitted(again, simulated);
     IdentificationOptions identification;
     identification.user_forces = options.user_forces;

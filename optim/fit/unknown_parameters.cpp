@@ -6,19 +6,17 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "optim/problem/parameter_values.hpp"
 
 namespace mbsopt {
 namespace {
 
-bool has_override(const ExperimentSpec& spec, const std::string& name, double* value = nullptr) {
-  for (const auto& [overridden, number] : spec.overrides) {
-    if (overridden != name) continue;
-    if (value) *value = number;
-    return true;
-  }
-  return false;
+// The value that an experiment gives a parameter; null if it gives none.
+const double* override_of(const ExperimentSpec& spec, const std::string& name) {
+  const auto found = std::ranges::find(spec.overrides, name, &std::pair<std::string, double>::first);
+  return found == spec.overrides.end() ? nullptr : &found->second;
 }
 
 }  // namespace
@@ -32,6 +30,25 @@ const std::string& record_name(const ExperimentSpec& experiment) {
   return experiment.origin ? experiment.origin->experiment : experiment.name;
 }
 
+RecordChannels record_channels(const IdentificationSpec& spec) {
+  RecordChannels channels;
+  for (std::size_t e = 0; e < spec.experiments.size(); ++e) {
+    const ExperimentSpec& experiment = spec.experiments[e];
+    const bool is_next_window = e > 0 && record_name(experiment) == record_name(spec.experiments[e - 1]);
+    channels.first.push_back(is_next_window ? channels.first.back() : channels.all.size());
+    for (std::size_t c = 0; !is_next_window && c < experiment.channels.size(); ++c) channels.all.push_back({e, c});
+  }
+  return channels;
+}
+
+void set_override(ExperimentSpec& experiment, const std::string& parameter, double value) {
+  const auto found = std::ranges::find(experiment.overrides, parameter, &std::pair<std::string, double>::first);
+  if (found != experiment.overrides.end())
+    found->second = value;
+  else
+    experiment.overrides.emplace_back(parameter, value);
+}
+
 bool is_held(const Parameter& p) {
   constexpr double kSame = 1e-12;  // of the bounds: nearer ones may be equal in the scaled variables of the solver
   return p.lower && p.upper && *p.upper - *p.lower <= kSame * std::max(std::abs(*p.lower), std::abs(*p.upper));
@@ -43,7 +60,7 @@ std::vector<UnknownParameter> free_in(const Scene& scene, const IdentificationSp
   if (here.free.empty()) return unknowns;
   for (const int k : parameter_indices(scene, here.free)) {
     UnknownParameter u{k, experiment, false, scene.parameters[static_cast<std::size_t>(k)]};
-    has_override(here, u.description.name, &u.description.value);  // starts there
+    if (const double* value = override_of(here, u.description.name)) u.description.value = *value;  // starts there
     if (!is_held(u.description)) unknowns.push_back(std::move(u));
   }
   return unknowns;
@@ -56,7 +73,7 @@ std::vector<UnknownParameter> unknowns_of_fit(const Scene& scene, const Identifi
       UnknownParameter u{k, 0, true, scene.parameters[static_cast<std::size_t>(k)]};
       const auto uses_it = [&](const ExperimentSpec& e) {
         const bool freed = std::find(e.free.begin(), e.free.end(), u.description.name) != e.free.end();
-        return !e.validate && !freed && !has_override(e, u.description.name);
+        return !e.validate && !freed && !override_of(e, u.description.name);
       };
       if (std::none_of(spec.experiments.begin(), spec.experiments.end(), uses_it))
         throw std::invalid_argument(fmt::format(
@@ -83,7 +100,7 @@ std::vector<Experiment::Unknown> unknowns_in(const Scene& scene, const Identific
     const UnknownParameter& u = unknowns[i];
     const bool is_free =
         std::any_of(freed.begin(), freed.end(), [&](const auto& f) { return f.parameter == u.parameter; });
-    const bool overridden = has_override(spec.experiments[experiment], u.description.name);
+    const bool overridden = override_of(spec.experiments[experiment], u.description.name) != nullptr;
     if (u.shared ? !is_free && !overridden : u.experiment == experiment)
       here.push_back({u.parameter, static_cast<Eigen::Index>(i)});
   }

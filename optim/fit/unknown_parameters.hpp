@@ -27,6 +27,19 @@ std::string place_of(const IdentificationSpec& spec, std::size_t experiment);  /
 // The experiment of the file that an experiment, or a window, belongs to.
 const std::string& record_name(const ExperimentSpec& experiment);
 
+// The channels of all records, counted through. A record is an experiment of the file with all its windows.
+struct RecordChannels {
+  struct Place {
+    std::size_t experiment, channel;  // the first window
+  };
+  std::vector<Place> all;
+  std::vector<std::size_t> first;  // per experiment or window: the number of its first channel
+};
+RecordChannels record_channels(const IdentificationSpec& spec);
+
+// Gives a parameter its own value in an experiment.
+void set_override(ExperimentSpec& experiment, const std::string& parameter, double value);
+
 // A parameter whose bounds leave it nowhere to go is a constant, not an unknown.
 bool is_held(const Parameter& parameter);
 // Throws std::invalid_argument with the place where nothing is to be fitted, or something that no experiment sees.

@@ -163,11 +163,8 @@ class Cut {
       return;
     }
     const VectorXd values = scaling.to_rho(found.x);
-    for (std::size_t i = 0; i < unknowns.size(); ++i) {
-      const std::string& name = unknowns[i].description.name;
-      std::erase_if(window.overrides, [&](const auto& entry) { return entry.first == name; });
-      window.overrides.emplace_back(name, values(static_cast<Index>(i)));
-    }
+    for (std::size_t i = 0; i < unknowns.size(); ++i)
+      set_override(window, unknowns[i].description.name, values(static_cast<Index>(i)));
   }
 
   // Each free parameter of a window must act on its start, since samples there say nothing of the others.
