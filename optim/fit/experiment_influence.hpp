@@ -1,5 +1,6 @@
-// How far the shared parameters would move without one of the experiments, to first order, by the linear model at the
-// solution. Parameters that are free in one experiment leave by QR factors of its rows:
+// How far the shared parameters would move without one group of experiments, and how well they would then explain the
+// others, to first order, by the linear model at the solution. Parameters that are free in one experiment leave by QR
+// factors of its rows:
 //
 //   [ J_own  J_shared | z ] = Q [ R S | q ]
 //                               [ 0 T | p ]        d = argmin sum_{i != e} |T_i d + p_i|^2 + |J_prior d + z_prior|^2
@@ -16,20 +17,18 @@
 
 namespace mbsopt {
 
-// Per member of the stack, for each variable x the change without it; 0 for those that are not shared. Infinite where
-// the others and priors do not determine one. Stacks must have no equalities.
-std::vector<Eigen::VectorXd> changes_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
-                                             const std::vector<UnknownParameter>& unknowns);
-
-// Weighted squares of the samples of all records but one: at the solution, and where they are least without that one,
-// to first order and whatever the bounds.
+// The others, without one group.
 struct OthersWithout {
+  // Of each variable x, 0 for those that are not shared. Infinite if the others and priors do not determine it.
+  Eigen::VectorXd change;
+  // Weighted squares of their samples: at the solution, and least ones, to first order and whatever the bounds.
   Eigen::Index samples = 0;
   double before = 0, after = 0;
 };
-// Per record; record_of_member: its number, from 0. Stacks must have no equalities, and shared variables.
+
+// Per group of members, which follow each other. Stacks must have no equalities, and shared variables.
 std::vector<OthersWithout> others_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
                                           const std::vector<UnknownParameter>& unknowns,
-                                          const std::vector<std::size_t>& record_of_member);
+                                          const std::vector<std::size_t>& group_of_member);
 
 }  // namespace mbsopt

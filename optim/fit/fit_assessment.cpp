@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "optim/fit/experiment_influence.hpp"
@@ -95,7 +96,7 @@ void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z
 FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& solution, const ExperimentStack& stack,
                             const std::vector<UnknownParameter>& unknowns) {
   const Eigen::VectorXd u_x = stack.scaling().rho_x(solution.x);
-  const Eigen::MatrixXd J = solution.point.z_x * u_x.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd J = z_in_parameters(stack, solution.point, solution.x);
   FitData data;
   data.J = J.topRows(stack.samples()), data.J_prior = J.middleRows(stack.samples(), stack.plain);
   data.C = J.bottomRows(stack.equalities);
@@ -147,9 +148,8 @@ std::vector<FittedParameter> described(const FitContext& fit, const std::vector<
 }
 
 Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquaresPoint& point,
-                                const Eigen::VectorXd& rho) {
-  const Eigen::VectorXd u_x = stack.scaling().rho_x(stack.scaling().to_x(rho));
-  return point.z_x.topRows(stack.samples()) * u_x.cwiseInverse().asDiagonal();
+                                const Eigen::VectorXd& x) {
+  return point.z_x * stack.scaling().rho_x(x).cwiseInverse().asDiagonal();
 }
 
 void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance,
@@ -171,14 +171,17 @@ void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastS
                      const std::vector<UnknownParameter>& unknowns) {
   const FitStatistics& s = fit.result.statistics;
   const bool determined = s.none.empty() && s.unidentifiable.empty();
-  if (stack.members().size() < 2 || stack.equalities > 0 || !determined || fit.options.preflight) return;
+  const bool shares = std::ranges::any_of(unknowns, &UnknownParameter::shared);
+  if (stack.members().size() < 2 || stack.equalities > 0 || !determined || !shares || fit.options.preflight) return;
   const Eigen::VectorXd errors = fit.result.statistics.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
-  const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution, unknowns);
-  for (std::size_t m = 0; m < changes.size(); ++m) {
+  std::vector<std::size_t> each(stack.members().size());
+  std::iota(each.begin(), each.end(), std::size_t{0});
+  const std::vector<OthersWithout> others = others_without(stack, solution, unknowns, each);
+  for (std::size_t m = 0; m < others.size(); ++m) {
     std::optional<Influence>& most = fit.result.experiments[stack.members()[m].experiment].influence;
     for (Eigen::Index k = 0; k < errors.size(); ++k) {
       const UnknownParameter& unknown = unknowns[static_cast<std::size_t>(k)];
-      const double change = changes[m](k) / errors(k);
+      const double change = others[m].change(k) / errors(k);
       if (unknown.shared && std::isfinite(errors(k)) && (!most || std::abs(change) > std::abs(most->change)))
         most = {unknown.description.name, change};
     }

@@ -28,9 +28,8 @@ FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& sol
 std::vector<FittedParameter> described(const FitContext& fit, const std::vector<UnknownParameter>& unknowns,
                                        const Eigen::VectorXd& values, const FitStatistics& statistics);
 
-// dz/drho of the samples.
-Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquaresPoint& point,
-                                const Eigen::VectorXd& rho);
+// dz/drho of all rows, at x.
+Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquaresPoint& point, const Eigen::VectorXd& x);
 
 // Sets the half-widths of the 95 % intervals for one more measurement: Seber and Wild, "Nonlinear Regression" (1989),
 // section 5.1.1. The rows of residuals of these samples begin at `first`:

@@ -164,17 +164,21 @@ class Doubts {
     const bool shares = std::ranges::any_of(unknowns, &UnknownParameter::shared);
     if (reasons_.size() < 2 || stack_.equalities > 0 || !shares || std::ranges::none_of(series_, &Series::is_resolved))
       return;
-    std::vector<std::size_t> record_of_member;
-    for (const ExperimentStack::Member& m : stack_.members())
-      record_of_member.push_back(static_cast<std::size_t>(
-          std::distance(reasons_.begin(), reasons_.find(record_name(fit_.spec.experiments[m.experiment])))));
-    const std::vector<OthersWithout> others = others_without(stack_, solution, unknowns, record_of_member);
-    for (auto record = reasons_.begin(); const auto& [samples, before, after] : others) {
-      std::string& why = (record++)->second;
+    std::vector<std::size_t> group_of_member;
+    std::vector<std::string> names;  // of the groups
+    for (const ExperimentStack::Member& m : stack_.members()) {
+      const std::string& name = record_name(fit_.spec.experiments[m.experiment]);
+      if (names.empty() || names.back() != name) names.push_back(name);
+      group_of_member.push_back(names.size());
+    }
+    const std::vector<OthersWithout> others = others_without(stack_, solution, unknowns, group_of_member);
+    for (std::size_t g = 0; g < names.size(); ++g) {
+      const auto& [change, samples, before, after] = others[g];
       const double n = static_cast<double>(samples), freedom = n - static_cast<double>(stack_.variables());
       if (freedom > 0 && after / freedom < kDisagree * kDisagree * before / n)
-        why += fmt::format("; without it the residuals of the others would fall from {:.3g} to {:.3g} sigma (rms)",
-                           std::sqrt(before / n), std::sqrt(after / freedom));
+        reasons_[names[g]] +=
+            fmt::format("; without it the residuals of the others would fall from {:.3g} to {:.3g} sigma (rms)",
+                        std::sqrt(before / n), std::sqrt(after / freedom));
     }
   }
 

@@ -108,7 +108,7 @@ class Identification {
               const std::vector<UnknownParameter>& unknowns) {
     score_all(fit_, stack, solution.point.z, fit_.sigmas_are_estimated);
     fit_.result.statistics = statistics_at(fit_, solution, stack, unknowns);
-    const Eigen::MatrixXd J = z_in_parameters(stack, solution.point, stack.scaling().to_rho(solution.x));
+    const Eigen::MatrixXd J = z_in_parameters(stack, solution.point, solution.x).topRows(stack.samples());
     predict(fit_, stack, J, fit_.result.statistics.covariance, 0);
     find_influences(fit_, stack, solution, unknowns);
     const std::size_t sigmas = fit_.sigmas_are_estimated ? SigmaEstimation(stack, fit_.spec).scale_groups().size() : 0;

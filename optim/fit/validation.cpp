@@ -72,10 +72,11 @@ std::optional<Sensitivities> sensitivities(FitContext& fit, std::size_t e, const
   if (F > 0) rho.head(F) = stack.scaling().to_rho(found.x);
   for (std::size_t i = 0; i < shared.size(); ++i)
     rho(F + static_cast<Eigen::Index>(i)) = fit.shared(all[static_cast<std::size_t>(F) + i].parameter);
-  const LeastSquaresPoint point = simulated(whole, scaling.to_x(rho));
+  const Eigen::VectorXd x = scaling.to_x(rho);
+  const LeastSquaresPoint point = simulated(whole, x);
   fit.result.simulations += whole.simulations();
   if (!point.ok) return std::nullopt;
-  const Eigen::MatrixXd J = z_in_parameters(whole, point, rho).topRows(N);
+  const Eigen::MatrixXd J = z_in_parameters(whole, point, x).topRows(N);
   Sensitivities s{J.leftCols(F), J.rightCols(J.cols() - F), {}, fit.result.statistics.covariance(shared, shared)};
   if (F == 0) return s;
   s.f_s = -OrthogonalDecomposition(s.J_f).solve(s.J);
