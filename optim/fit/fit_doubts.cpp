@@ -31,55 +31,14 @@ double rms(const Eigen::VectorXd& x) { return x.norm() / std::sqrt(std::max(1.0,
 double deviation(const Eigen::VectorXd& x) { return x.size() > 0 ? rms(x.array() - x.mean()) : 0; }
 double span_of(const Eigen::VectorXd& x) { return x.maxCoeff() - x.minCoeff(); }
 
-// A channel of a record: its rows in the stack, and the sizes of what the loss keeps of them.
-struct Series {
-  std::size_t member, channel;  // the first one of the record
-  std::string record, column, sensor;
-  std::vector<Eigen::Index> rows = {}, taken_out = {};
-  Eigen::VectorXd measured = {}, residual = {};
-  double left = 0, spread = 0;  // rms of the residuals, of measured about its mean
-  double noise = 0;             // that may be left: sigma, or what differences show where it is estimated
-  bool is_beyond() const { return left > kBeyond * noise; }
-  bool is_resolved() const { return left > kIntegrated * spread; }
-  bool is_explained() const { return left <= kUnexplained * spread; }
-};
-
-std::vector<Series> series_of(const FitContext& fit, const ExperimentStack& stack) {
-  std::vector<Series> all;
-  Eigen::Index row = 0;
-  for (std::size_t m = 0; m < stack.members().size(); ++m) {
-    const ExperimentSpec& spec = fit.spec.experiments[stack.members()[m].experiment];
-    for (const Experiment::Sample& sample : stack.members()[m].model.samples()) {
-      const ChannelSpec& channel = spec.channels[sample.channel];
-      auto found = std::ranges::find_if(
-          all, [&](const Series& s) { return s.channel == sample.channel && s.record == record_name(spec); });
-      if (found == all.end())
-        found = all.insert(all.end(), {m, sample.channel, record_name(spec), channel.column, channel.sensor});
-      const double z = fit.result.residuals[static_cast<std::size_t>(row)].scaled;
-      (stack.loss.at(z * z).rho1 < kTakenOut ? found->taken_out : found->rows).push_back(row++);
-    }
-  }
-  const Eigen::VectorXd measured = stack.measured();
-  Eigen::VectorXd residual = measured;
-  for (Eigen::Index i = 0; i < row; ++i) residual(i) -= fit.result.residuals[static_cast<std::size_t>(i)].model;
-  for (Series& s : all) {
-    s.measured = measured(s.rows), s.residual = residual(s.rows);
-    s.left = rms(s.residual), s.spread = deviation(s.measured);
-    const ExperimentStack::Member& m = stack.members()[s.member];
-    const bool estimated = fit.spec.experiments[m.experiment].channels[s.channel].estimate_sigma != SigmaEstimate::none;
-    s.noise = estimated ? differenced_noise(s.measured) : m.model.sigma(s.channel);
-  }
-  return all;
-}
-
 class Doubts {
  public:
-  Doubts(const FitContext& fit, const ExperimentStack& stack)
-      : fit_(fit), stack_(stack), series_(series_of(fit, stack)) {}
+  Doubts(const FitContext& fit, const std::vector<ChannelRecord>& records, const ExperimentStack& stack)
+      : fit_(fit), stack_(stack), records_(records) {}
 
   std::vector<std::string> all(const LeastSquaresResult& solution, const std::vector<UnknownParameter>& unknowns) {
-    for (const Series& s : series_) say_taken_out(s), doubt_explanation(s), doubt_given_sigma(s);
-    for (const Series& s : series_) compare_elsewhere(s);
+    for (const ChannelRecord& s : records_) say_taken_out(s), doubt_explanation(s), doubt_given_sigma(s);
+    for (const ChannelRecord& s : records_) compare_elsewhere(s);
     // A record that estimated sigmas have given up tells nothing of the others.
     if (std::ranges::all_of(reasons_, [](const auto& of) { return of.second.empty(); }))
       leave_out_each(solution, unknowns);
@@ -88,8 +47,8 @@ class Doubts {
         add("experiment '{}' disagrees with the others{}. Look at its columns, units, signs and clock, or free the "
             "parameters that differ there",
             record, why);
-    for (auto b = series_.begin(); b != series_.end(); ++b)
-      for (auto a = series_.begin(); a != b; ++a) compare_noise(*a, *b);
+    for (auto b = records_.begin(); b != records_.end(); ++b)
+      for (auto a = records_.begin(); a != b; ++a) compare_noise(*a, *b);
     return std::move(doubts_);
   }
 
@@ -102,7 +61,7 @@ class Doubts {
 
   // Huber's loss takes out none: its pull is constant. Neighbours are one part: "run.csv:57 (1.12 s), run.csv:60 to
   // run.csv:64 (1.2 to 1.28 s)".
-  void say_taken_out(const Series& s) {
+  void say_taken_out(const ChannelRecord& s) {
     constexpr int kMost = 5;  // parts in a sentence
     std::string places;
     int parts = 0;
@@ -127,7 +86,7 @@ class Doubts {
           s.taken_out.size(), s.taken_out.size() + s.rows.size(), s.column, s.record, places);
   }
 
-  void doubt_explanation(const Series& s) {
+  void doubt_explanation(const ChannelRecord& s) {
     if (s.left > s.spread && s.is_beyond())
       add("the fit explains nothing of '{}' in '{}': its residuals are {:.3g} (rms), the measured values differ from "
           "their own mean by {:.3g} (rms). A unit, a sign or the model is wrong, or the fit ended in another minimum: "
@@ -136,23 +95,23 @@ class Doubts {
   }
 
   // Doubts a shared sigma once, and none that the file does not give.
-  void doubt_given_sigma(const Series& s) {
-    const ExperimentStack::Member& m = stack_.members()[s.member];
-    const ChannelSpec& channel = fit_.spec.experiments[m.experiment].channels[s.channel];
-    const double sigma = m.model.sigma(s.channel), given = m.model.given_sigma(s.channel);
+  void doubt_given_sigma(const ChannelRecord& s) {
+    const Experiment& model =
+        std::ranges::find(stack_.members(), s.experiment, &ExperimentStack::Member::experiment)->model;
+    const ChannelSpec& channel = fit_.spec.experiments[s.experiment].channels[s.channel];
+    const double sigma = model.sigma(s.channel), given = model.given_sigma(s.channel);
     const bool own = channel.estimate_sigma == SigmaEstimate::own;
     if (has_sigma(channel) && sigma > kRevised * given && (own || revised_.insert(s.column).second))
       add("the sigma of '{}'{} is estimated as {:.3g}, {:.3g} times the given {:.3g}: the model explains this column "
-          "far "
-          "worse than expected",
+          "far worse than expected",
           s.column, own ? fmt::format(" in '{}'", s.record) : "", sigma, sigma / given, given);
   }
 
   // Compares with the same sensor in the other records, also in parts of the signal: larger motions have larger errors.
-  void compare_elsewhere(const Series& s) {
+  void compare_elsewhere(const ChannelRecord& s) {
     std::string& why = reasons_[s.record];
     double most = 0, part = 0;
-    for (const Series& other : series_)
+    for (const ChannelRecord& other : records_)
       if (other.record != s.record && other.sensor == s.sensor)
         most = std::max(most, other.left), part = std::max(part, other.left / other.spread);
     if (most > 0 && s.is_beyond() && s.left > kElsewhere * std::max(most, part * s.spread))
@@ -162,7 +121,8 @@ class Doubts {
 
   void leave_out_each(const LeastSquaresResult& solution, const std::vector<UnknownParameter>& unknowns) {
     const bool shares = std::ranges::any_of(unknowns, &UnknownParameter::shared);
-    if (reasons_.size() < 2 || stack_.equalities > 0 || !shares || std::ranges::none_of(series_, &Series::is_resolved))
+    if (reasons_.size() < 2 || stack_.equalities > 0 || !shares ||
+        std::ranges::none_of(records_, &ChannelRecord::is_resolved))
       return;
     std::vector<std::size_t> group_of_member;
     std::vector<std::string> names;  // of the groups
@@ -184,9 +144,9 @@ class Doubts {
 
   // Errors of the model may be alike in two channels, but change slowly. Noise of two sensors is not alike, and
   // differences from sample to sample show it.
-  void compare_noise(const Series& a, const Series& b) {
+  void compare_noise(const ChannelRecord& a, const ChannelRecord& b) {
     constexpr int kFewest = 10;
-    const auto is_usable = [](const Series& s) { return s.is_resolved() && s.is_explained(); };
+    const auto is_usable = [](const ChannelRecord& s) { return s.is_resolved() && s.is_explained(); };
     if (a.record != b.record || !is_usable(a) || !is_usable(b)) return;
     double aa = 0, bb = 0, ab = 0, last_a = 0, last_b = 0;
     int pairs = 0;
@@ -201,16 +161,14 @@ class Doubts {
     }
     if (pairs >= kFewest && ab * ab > kCopied * kCopied * aa * bb)
       add("the residuals of '{}' and '{}' in '{}' change alike from sample to sample (correlation {:.3f}): one column "
-          "may "
-          "be a copy of the other, or the model errs alike in both. They count as two independent measurements but "
-          "tell "
-          "little more than one, so that standard errors may be too small by up to sqrt(2)",
+          "may be a copy of the other, or the model errs alike in both. They count as two independent measurements but "
+          "tell little more than one, so that standard errors may be too small by up to sqrt(2)",
           a.column, b.column, a.record, ab / std::sqrt(aa * bb));
   }
 
   const FitContext& fit_;
   const ExperimentStack& stack_;
-  const std::vector<Series> series_;
+  const std::vector<ChannelRecord>& records_;
   std::map<std::string, std::string> reasons_;  // why a record disagrees
   std::set<std::string> revised_;               // columns whose shared sigma is doubted
   std::vector<std::string> doubts_;
@@ -218,48 +176,66 @@ class Doubts {
 
 }  // namespace
 
-std::vector<std::string> doubts_of_fit(const FitContext& fit, const ExperimentStack& stack,
-                                       const LeastSquaresResult& solution,
-                                       const std::vector<UnknownParameter>& unknowns) {
-  return Doubts(fit, stack).all(solution, unknowns);
+bool ChannelRecord::is_explained() const { return left <= kUnexplained * spread; }
+bool ChannelRecord::is_beyond() const { return left > kBeyond * noise; }
+bool ChannelRecord::is_resolved() const { return left > kIntegrated * spread; }
+
+std::vector<ChannelRecord> channel_records(const FitContext& fit, const ExperimentStack& stack) {
+  const RecordChannels channels = record_channels(fit.spec);
+  std::vector<ChannelRecord> all;
+  for (const auto& [e, c] : channels.all) {
+    const ChannelSpec& channel = fit.spec.experiments[e].channels[c];
+    all.push_back({e, c, record_name(fit.spec.experiments[e]), channel.column, channel.sensor});
+  }
+  for (std::size_t i = 0; i < fit.result.residuals.size(); ++i) {
+    const ResidualRow& row = fit.result.residuals[i];
+    ChannelRecord& record = all[channels.first[row.experiment] + row.channel];
+    const bool is_kept = stack.loss.at(row.scaled * row.scaled).rho1 >= kTakenOut;
+    (is_kept ? record.rows : record.taken_out).push_back(static_cast<Eigen::Index>(i));
+  }
+  std::erase_if(all, [](const ChannelRecord& r) { return r.rows.empty() && r.taken_out.empty(); });
+  for (ChannelRecord& r : all) {
+    r.measured.resize(static_cast<Eigen::Index>(r.rows.size())), r.residual.resize(r.measured.size());
+    for (Eigen::Index i = 0; i < r.measured.size(); ++i) {
+      const ResidualRow& row = fit.result.residuals[static_cast<std::size_t>(r.rows[static_cast<std::size_t>(i)])];
+      r.measured(i) = row.measured, r.residual(i) = row.measured - row.model;
+    }
+    r.left = rms(r.residual), r.spread = deviation(r.measured);
+    const bool estimated = fit.spec.experiments[r.experiment].channels[r.channel].estimate_sigma != SigmaEstimate::none;
+    r.noise =
+        estimated ? differenced_noise(r.measured) : fit.result.experiments[r.experiment].channels[r.channel].sigma;
+  }
+  return all;
 }
 
-std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const ExperimentStack& stack,
-                                     const Eigen::VectorXd& z_start) {
+std::vector<std::string> doubts_of_fit(const FitContext& fit, const std::vector<ChannelRecord>& records,
+                                       const ExperimentStack& stack, const LeastSquaresResult& solution,
+                                       const std::vector<UnknownParameter>& unknowns) {
+  return Doubts(fit, records, stack).all(solution, unknowns);
+}
+
+std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const std::vector<ChannelRecord>& records,
+                                     const ExperimentStack& stack, const Eigen::VectorXd& z_start) {
   std::vector<AngleDoubt> doubts;
-  for (const Series& s : series_of(fit, stack)) {
-    const std::size_t e = stack.members()[s.member].experiment;
+  for (const ChannelRecord& s : records) {
     const auto sensor = std::ranges::find(fit.scene.sensors, s.sensor, &Sensor::name);
     const std::string unit = unit_of(fit.scene, *sensor);
-    const bool is_stated = !stated_unit(fit.spec.experiments[e].channels[s.channel], fit.data[e]).empty();
+    const bool is_stated =
+        !stated_unit(fit.spec.experiments[s.experiment].channels[s.channel], fit.data[s.experiment]).empty();
     if ((unit != "rad" && unit != "rad/s") || is_stated || s.rows.size() < 2) continue;
     const double span = span_of(s.measured), end = span_of(s.measured - s.residual),
                  start = span_of(s.measured - z_start(s.rows).cwiseProduct(stack.sigma()(s.rows)));
     const auto as_degrees = [&](double model) { return span > kNear * model && span < kNear * kDegrees * model; };
     const bool plausible = s.is_explained() || (unit == "rad" && span <= std::numbers::pi);
     doubts.push_back(
-        {s.record, s.column, fmt::format("{}.channels[{}].column", place_of(fit.spec, e), s.channel), unit,
+        {s.record, s.column, fmt::format("{}.channels[{}].column", place_of(fit.spec, s.experiment), s.channel), unit,
          fmt::format("the values of '{}' span {:.3g}, those of the model {:.3g} {} at the start of the fit "
                      "and {:.3g} {} at its end",
                      s.column, span, start, unit, end, unit),
-         !plausible && (as_degrees(start) || as_degrees(end))});
+         !plausible && (as_degrees(start) || as_degrees(end)), s.unexplained()});
   }
   if (std::ranges::none_of(doubts, &AngleDoubt::is_likely)) doubts.clear();
   return doubts;
-}
-
-double unexplained(const IdentificationResult& result, const std::string& record, const std::string& column) {
-  std::vector<double> measured, residual;
-  for (const ResidualRow& row : result.residuals) {
-    const ExperimentFit& fit = result.experiments[row.experiment];
-    if ((fit.window ? fit.window->experiment : fit.name) != record || fit.channels[row.channel].column != column)
-      continue;
-    measured.push_back(row.measured), residual.push_back(row.measured - row.model);
-  }
-  const auto n = static_cast<Eigen::Index>(measured.size());
-  return n == 0 ? 1
-                : rms(Eigen::Map<Eigen::VectorXd>(residual.data(), n)) /
-                      deviation(Eigen::Map<Eigen::VectorXd>(measured.data(), n));
 }
 
 }  // namespace mbsopt

@@ -1,8 +1,9 @@
 // Doubts about a fit, in sentences. They judge the samples that the loss keeps, record by record: the windows of an
 // experiment are one record.
 //
-//   for (std::string& words : doubts_of_fit(fit, stack, solution, unknowns)) ...
-//   for (const AngleDoubt& doubt : angle_doubts(fit, stack, z_start)) ...   // to be tested by another fit
+//   const std::vector<ChannelRecord> records = channel_records(fit, stack);
+//   for (std::string& words : doubts_of_fit(fit, records, stack, solution, unknowns)) ...
+//   for (const AngleDoubt& doubt : angle_doubts(fit, records, stack, z_start)) ...   // to be tested by another fit
 #pragma once
 
 #include <Eigen/Core>
@@ -14,10 +15,26 @@
 
 namespace mbsopt {
 
+// A channel of a record: its samples, as rows of the stack, and the sizes of what the loss keeps of them.
+struct ChannelRecord {
+  std::size_t experiment = 0, channel = 0;  // the first one of the record
+  std::string record = {}, column = {}, sensor = {};
+  std::vector<Eigen::Index> rows = {}, taken_out = {};
+  Eigen::VectorXd measured = {}, residual = {};
+  double left = 0, spread = 0;  // rms of the residuals, of measured about its mean
+  double noise = 0;             // that may be left: sigma, or what differences show where it is estimated
+  double unexplained() const { return left / spread; }
+  bool is_explained() const;
+  bool is_beyond() const;
+  bool is_resolved() const;
+};
+// The experiments of the stack must be scored.
+std::vector<ChannelRecord> channel_records(const FitContext& fit, const ExperimentStack& stack);
+
 // Names samples that a loss takes out, channels of which the fit explains nothing, records that disagree with the
 // others, estimated sigmas far above the given ones, and channels that repeat another one.
-std::vector<std::string> doubts_of_fit(const FitContext& fit, const ExperimentStack& stack,
-                                       const LeastSquaresResult& solution,
+std::vector<std::string> doubts_of_fit(const FitContext& fit, const std::vector<ChannelRecord>& records,
+                                       const ExperimentStack& stack, const LeastSquaresResult& solution,
                                        const std::vector<UnknownParameter>& unknowns);
 
 // The column of a record that may be in degrees, since no unit is stated. It is likely if its measured values span
@@ -26,12 +43,11 @@ std::vector<std::string> doubts_of_fit(const FitContext& fit, const ExperimentSt
 struct AngleDoubt {
   std::string record, column, path, unit, words;
   bool is_likely = false;
+  double unexplained = 1;
 };
 
 // None if none is likely. z_start: residuals by the sigmas of the stack.
-std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const ExperimentStack& stack,
-                                     const Eigen::VectorXd& z_start);
-// rms of the residuals of a record's column over that of the measured values about their mean.
-double unexplained(const IdentificationResult& result, const std::string& record, const std::string& column);
+std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const std::vector<ChannelRecord>& records,
+                                     const ExperimentStack& stack, const Eigen::VectorXd& z_start);
 
 }  // namespace mbsopt

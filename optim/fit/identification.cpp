@@ -56,6 +56,7 @@ class Identification {
   }
 
   const std::vector<AngleDoubt>& doubted_angles() const { return angles_; }
+  const std::vector<ChannelRecord>& records() const { return records_; }
 
   IdentificationResult run() {
     const Stopwatch stopwatch;
@@ -152,9 +153,11 @@ class Identification {
           "the model is wrong, or the fit ended in another minimum",
           beyond, counted(stack.samples(), "sample"), stack.loss.s()));
     doubt_sigmas();
+    records_ = channel_records(fit_, stack);
     if (!fit_.options.preflight)
-      std::ranges::move(doubts_of_fit(fit_, stack, solution, unknowns), std::back_inserter(fit_.result.warnings));
-    if (fit_.options.tests_angles) angles_ = angle_doubts(fit_, stack, at_start);
+      std::ranges::move(doubts_of_fit(fit_, records_, stack, solution, unknowns),
+                        std::back_inserter(fit_.result.warnings));
+    if (fit_.options.tests_angles) angles_ = angle_doubts(fit_, records_, stack, at_start);
   }
 
   // Intervals that rest on the given sigmas. Beyond a factor of 2 an interval of 95 % holds the truth in 67 % at most.
@@ -179,15 +182,30 @@ class Identification {
   }
 
   FitContext fit_;
+  std::vector<ChannelRecord> records_;
   std::vector<AngleDoubt> angles_;
   std::mutex told_;
 };
 
+struct Fit {
+  IdentificationResult result;
+  std::vector<ChannelRecord> records;
+  std::vector<AngleDoubt> angles;
+};
+
+Fit fit_of(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options) {
+  const CutProblem cut =
+      cut_into_windows(what_measurements_need(problem), data, options.user_forces, options.simulation_progress);
+  Identification identification(cut.problem, cut.data, options);
+  Fit fit{identification.run(), identification.records(), identification.doubted_angles()};
+  fit.result.warnings.insert(fit.result.warnings.begin(), cut.warnings.begin(), cut.warnings.end());
+  return fit;
+}
+
 // Fits again with the likely columns in degrees, then with all doubted ones, which one logger wrote. Returns the doubts
 // about columns that are then explained better.
 std::vector<std::string> confirmed(const std::vector<AngleDoubt>& doubts, const Problem& problem,
-                                   const std::vector<CsvTable>& data, const IdentificationOptions& options,
-                                   const IdentificationResult& given) {
+                                   const std::vector<CsvTable>& data, const IdentificationOptions& options) {
   constexpr double kGain = 0.5;  // of what is unexplained; chance and a smaller signal change it far less
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   IdentificationOptions again;
@@ -201,10 +219,11 @@ std::vector<std::string> confirmed(const std::vector<AngleDoubt>& doubts, const 
       for (std::size_t e = 0; e < data.size(); ++e)
         if ((all || doubt.is_likely) && record_name(experiments[e]) == doubt.record && data[e].has_column(doubt.column))
           for (double& x : converted[e].columns[data[e].find_column(doubt.column)]) x *= std::numbers::pi / 180;
-    const IdentificationResult degrees = run_identification(problem, converted, again);
+    const std::vector<ChannelRecord> degrees = fit_of(problem, converted, again).records;
     for (const AngleDoubt& doubt : doubts) {
-      const double before = unexplained(given, doubt.record, doubt.column),
-                   after = unexplained(degrees, doubt.record, doubt.column);
+      const auto record = std::ranges::find_if(
+          degrees, [&](const ChannelRecord& r) { return r.record == doubt.record && r.column == doubt.column; });
+      const double before = doubt.unexplained, after = record == degrees.end() ? 1 : record->unexplained();
       if ((all || doubt.is_likely) && after <= kGain * before)
         words.push_back(fmt::format(
             "{}: {}; in degrees, a fit leaves {:.2g} of the deviation of its values, not {:.2g}: is the column in "
@@ -219,14 +238,10 @@ std::vector<std::string> confirmed(const std::vector<AngleDoubt>& doubts, const 
 
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options) {
-  const CutProblem cut =
-      cut_into_windows(what_measurements_need(problem), data, options.user_forces, options.simulation_progress);
-  Identification identification(cut.problem, cut.data, options);
-  IdentificationResult result = identification.run();
-  result.warnings.insert(result.warnings.begin(), cut.warnings.begin(), cut.warnings.end());
-  if (const std::vector<AngleDoubt>& doubts = identification.doubted_angles(); !doubts.empty())
-    std::ranges::move(confirmed(doubts, problem, data, options, result), std::back_inserter(result.warnings));
-  return result;
+  Fit fit = fit_of(problem, data, options);
+  if (!fit.angles.empty())
+    std::ranges::move(confirmed(fit.angles, problem, data, options), std::back_inserter(fit.result.warnings));
+  return std::move(fit.result);
 }
 
 Problem with_fitted_values(Problem problem, const IdentificationResult& fit) {
