@@ -34,37 +34,35 @@ struct Variances {
   double variance, likelihood_scale;
 };
 
-// psi = rho1 z, psi_z = rho1 + 2 z^2 rho2. The likelihood's scale is mean(psi^2)/mean(psi_z), by which twice the rise
-// of the cost is about chi^2: Hampel, Ronchetti, Rousseeuw and Stahel, "Robust Statistics" (1986), section 7.2. For the
-// square both are s^2.
+// psi = rho1 z and psi_z = rho1 + 2 z^2 rho2 of each residual. For the square psi is z.
+struct Influences {
+  VectorXd psi, psi_z;
+  VectorXd scaled() const { return psi / psi_z.mean(); }
+};
+
+Influences influences_of(const FitData& data) {
+  Influences all{data.z, VectorXd::Ones(data.z.size())};
+  if (data.loss.type == LossType::squared) return all;
+  for (Index i = 0; i < data.z.size(); ++i) {
+    const double z = data.z(i);
+    const LossValue v = data.loss.at(z * z);
+    all.psi(i) = v.rho1 * z, all.psi_z(i) = v.rho1 + 2 * z * z * v.rho2;
+  }
+  return all;
+}
+
+// The likelihood's scale is mean(psi^2)/mean(psi_z), by which twice the rise of the cost is about chi^2: Hampel,
+// Ronchetti, Rousseeuw and Stahel, "Robust Statistics" (1986), section 7.2. For the square both are s^2.
 Variances variances(const FitData& data, long degrees_of_freedom, double s2) {
   if (data.loss.type == LossType::squared) return {data.sigma_is_known ? 1 : s2, data.sigma_is_known ? 1 : s2};
   const double N = static_cast<double>(data.z.size()), P = static_cast<double>(data.rho.size() - data.C.rows());
   if (degrees_of_freedom < 1) return {s2, s2};
-  double squares = 0, slope = 0, slope_squares = 0;
-  for (const double z : data.z) {
-    const LossValue v = data.loss.at(z * z);
-    const double psi_z = v.rho1 + 2 * z * z * v.rho2;
-    squares += v.rho1 * v.rho1 * z * z, slope += psi_z, slope_squares += psi_z * psi_z;
-  }
-  slope /= N;
+  const Influences of = influences_of(data);
+  const double slope = of.psi_z.mean(), slope_squares = of.psi_z.squaredNorm() / N;
   if (!(slope > 0)) return {kInfinity, kInfinity};
-  const double K = 1 + P / N * (slope_squares / N - slope * slope) / (slope * slope);
-  const double mean_square = squares / static_cast<double>(degrees_of_freedom);
+  const double K = 1 + P / N * (slope_squares - slope * slope) / (slope * slope);
+  const double mean_square = of.psi.squaredNorm() / static_cast<double>(degrees_of_freedom);
   return {K * K * mean_square / (slope * slope), mean_square / slope};
-}
-
-// psi/mean(psi_z), which is z where the loss is the square.
-VectorXd influences(const FitData& data) {
-  VectorXd psi = data.z;
-  if (data.loss.type == LossType::squared) return psi;
-  double slope = 0;
-  for (Index i = 0; i < psi.size(); ++i) {
-    const double z = data.z(i);
-    const LossValue v = data.loss.at(z * z);
-    psi(i) = v.rho1 * z, slope += v.rho1 + 2 * z * z * v.rho2;
-  }
-  return psi * (static_cast<double>(psi.size()) / slope);
 }
 
 // Orthonormal columns Z with C Z = 0; C: of independent rows.
@@ -143,7 +141,7 @@ MatrixXd sandwich_covariance(const FitData& data, const ScoreVariance& scores_va
     return !marks.empty() && marks[static_cast<std::size_t>(used[static_cast<std::size_t>(a)])];
   };
   const MatrixXd q = scaled * V, inverse = V * V.transpose(), a_J = scaled.topRows(N) * inverse;
-  const VectorXd z = influences(data);
+  const VectorXd z = influences_of(data).scaled();
   const MatrixXd scores = scores_of(z, scaled.topRows(N));
   const MatrixXd within = inverse * scores_vary.within(scores) * inverse;
   VectorXd left_out;
