@@ -146,15 +146,14 @@ class Group {
     const MatrixXd rows = absolute_rows();
     std::vector<std::string> terms;
     for (Index r = 0; r < rows.rows(); ++r) {
-      std::string sum;
+      std::vector<double> factors;
+      std::vector<std::string> names;
       for (Index k = 0; k < rows.cols(); ++k) {
-        const double x = rows(r, k);
-        if (x == 0) continue;
-        if (!sum.empty()) sum += x < 0 ? " - " : " + ";
-        if (!is_near(std::abs(x), 1)) sum += fmt::format("{:.4g}*", std::abs(x));
-        sum += names_[static_cast<std::size_t>(k)];
+        if (rows(r, k) == 0) continue;
+        factors.push_back(is_near(std::abs(rows(r, k)), 1) ? std::copysign(1, rows(r, k)) : rows(r, k));
+        names.push_back(names_[static_cast<std::size_t>(k)]);
       }
-      terms.push_back(sum);
+      terms.push_back(sum_in_words(factors, names));
     }
     return terms;
   }

@@ -96,55 +96,47 @@ class Search {
 
   static bool of_one_unit(const Term& a, const Term& b) { return a.dimension == b.dimension; }
 
-  // left is what the space leaves of these terms with 1 or -1 before each.
-  void consider(std::vector<const Term*> terms, std::vector<double> signs, std::optional<double> last) {
+  // Takes the sum of these terms if the space leaves nothing of it. has_number: the last factor is neither 1 nor -1.
+  void consider(const std::vector<const Term*>& terms, const std::vector<double>& factors, bool has_number) {
     VectorXd left = VectorXd::Zero(rho_.size()), gradient = left;
     double length = 0, degrees = 0;
-    if (last) signs.back() = *last;
+    std::vector<std::string> texts;
     for (std::size_t i = 0; i < terms.size(); ++i) {
-      left += signs[i] * terms[i]->left, gradient += signs[i] * terms[i]->gradient;
-      length = std::max(length, std::abs(signs[i]) * terms[i]->gradient.norm());
+      left += factors[i] * terms[i]->left, gradient += factors[i] * terms[i]->gradient;
+      length = std::max(length, std::abs(factors[i]) * terms[i]->gradient.norm());
       degrees += terms[i]->degree;
+      texts.push_back(terms[i]->text);
     }
     if (left.norm() > kNothing * length || gradient.norm() < kDependent * length) return;
-    std::string text;
-    for (std::size_t i = 0; i < terms.size(); ++i) {
-      if (i > 0) text += signs[i] < 0 ? " - " : " + ";
-      if (std::abs(signs[i]) != 1) text += fmt::format("{:.4g}*", std::abs(signs[i]));
-      text += terms[i]->text;
-    }
-    sums_.push_back(
-        {text, 100.0 * static_cast<double>(terms.size()) + (last ? 50 + terms.back()->degree : 0) + degrees, gradient});
+    const double cost =
+        100.0 * static_cast<double>(terms.size()) + (has_number ? 50 + terms.back()->degree : 0) + degrees;
+    sums_.push_back({sum_in_words(factors, texts), cost, gradient});
+  }
+
+  // Adds a last term, with the factor that takes away most of the rest.
+  void complete(std::vector<const Term*> terms, std::vector<double> factors, const Term& last) {
+    VectorXd rest = VectorXd::Zero(rho_.size());
+    for (std::size_t i = 0; i < terms.size(); ++i) rest += factors[i] * terms[i]->left;
+    double x = -rest.dot(last.left) / last.left.squaredNorm();
+    const bool is_sign = std::abs(std::abs(x) - 1) <= kNothing, with_numbers = rho_.size() - Q_.cols() >= 2;
+    if (is_sign ? !of_one_unit(*terms.front(), last) : !with_numbers || x == 0) return;
+    terms.push_back(&last), factors.push_back(is_sign ? std::copysign(1, x) : x);
+    consider(terms, factors, !is_sign);
   }
 
   void find_sums() {
-    const bool with_numbers = rho_.size() - Q_.cols() >= 2;
-    for (const Term& a : terms_)
-      if (a.left.norm() <= kNothing * a.gradient.norm()) consider({&a}, {1}, {});
-    if (!all_units_) return;
     std::vector<const Term*> open;  // that alone are not determined
     for (const Term& a : terms_)
-      if (a.left.norm() > kNothing * a.gradient.norm()) open.push_back(&a);
-    // The factor of c with which it takes away most of the rest.
-    const auto factor = [](const VectorXd& rest, const Term& c) { return -rest.dot(c.left) / c.left.squaredNorm(); };
-    const auto is_number = [&](double x) { return with_numbers && std::abs(std::abs(x) - 1) > kNothing && x != 0; };
+      a.left.norm() <= kNothing* a.gradient.norm() ? consider({&a}, {1}, false) : open.push_back(&a);
+    if (!all_units_) return;
     for (std::size_t i = 0; i < open.size(); ++i)
       for (std::size_t j = i + 1; j < open.size(); ++j) {
-        const Term &a = *open[i], &b = *open[j];
-        if (of_one_unit(a, b))
-          for (const double sign : {1., -1.}) consider({&a, &b}, {1, sign}, {});
-        if (const double x = factor(a.left, b); is_number(x)) consider({&a, &b}, {1, x}, x);
-        if (const double x = factor(b.left, a); is_number(x)) consider({&b, &a}, {1, x}, x);
-        if (!of_one_unit(a, b)) continue;
-        for (std::size_t k = 0; k < open.size(); ++k) {
-          if (k == i || k == j) continue;
-          for (const double sign : {1., -1.}) {
-            const double x = factor(a.left + sign * b.left, *open[k]);
-            if (is_number(x)) consider({&a, &b, open[k]}, {1, sign, x}, x);
-            if (k > j && of_one_unit(a, *open[k]))
-              for (const double third : {1., -1.}) consider({&a, &b, open[k]}, {1, sign, third}, {});
-          }
-        }
+        complete({open[i]}, {1}, *open[j]);
+        complete({open[j]}, {1}, *open[i]);
+        if (!of_one_unit(*open[i], *open[j])) continue;
+        for (std::size_t k = 0; k < open.size(); ++k)
+          for (const double sign : {1., -1.})
+            if (k != i && k != j) complete({open[i], open[j]}, {1, sign}, *open[k]);
       }
   }
 
@@ -158,6 +150,16 @@ class Search {
 };
 
 }  // namespace
+
+std::string sum_in_words(const std::vector<double>& factors, const std::vector<std::string>& terms) {
+  std::string sum;
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    if (i > 0) sum += factors[i] < 0 ? " - " : " + ";
+    if (std::abs(factors[i]) != 1) sum += fmt::format("{:.4g}*", std::abs(factors[i]));
+    sum += terms[i];
+  }
+  return sum;
+}
 
 std::optional<std::vector<std::string>> sums_of_products(const MatrixXd& Q, const VectorXd& rho, const VectorXd& size,
                                                          const std::vector<std::string>& names,

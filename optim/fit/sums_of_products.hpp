@@ -23,4 +23,7 @@ std::optional<std::vector<std::string>> sums_of_products(const Eigen::MatrixXd& 
                                                          const std::vector<std::string>& names,
                                                          const std::vector<std::string>& units);
 
+// "m1 - 0.04*m2" of terms and their factors; the first factor is positive.
+std::string sum_in_words(const std::vector<double>& factors, const std::vector<std::string>& terms);
+
 }  // namespace mbsopt
