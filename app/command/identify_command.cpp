@@ -12,7 +12,6 @@
 #include "app/results/joint_forces.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/optimized_problem.hpp"
-#include "app/results/preflight_results.hpp"
 #include "app/results/sensor_unit.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/results/variant_results.hpp"

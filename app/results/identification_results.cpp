@@ -18,6 +18,10 @@ constexpr Eigen::Index kWholeMatrix = 10;  // parameters, up to which the correl
 constexpr std::size_t kInfluences = 3;     // number of printed ones
 constexpr double kStrong = 0.9;            // correlation worth a line of its own
 
+std::string error_of(const FittedParameter& p) {
+  return std::isfinite(p.std_error) ? significant(p.std_error, 3) : "-";
+}
+
 std::string interval_of(const FittedParameter& p) {
   if (std::isnan(p.std_error)) return "-";
   if (std::isinf(p.std_error)) return "undetermined";
@@ -26,8 +30,7 @@ std::string interval_of(const FittedParameter& p) {
 
 void add_rows(TextTable& table, const std::vector<FittedParameter>& parameters) {
   for (const FittedParameter& p : parameters) {
-    table.add({p.name, significant(p.initial), significant(p.value, 9),
-               std::isfinite(p.std_error) ? significant(p.std_error, 3) : "-", interval_of(p),
+    table.add({p.name, significant(p.initial), significant(p.value, 9), error_of(p), interval_of(p),
                p.unit.empty() ? "-" : p.unit, bound_hit(p.at_lower, p.at_upper)});
   }
 }
@@ -116,6 +119,14 @@ std::string determined_in_words(const IdentificationResult& fit) {
                              s.singular_values(s.rank - 1));
 }
 
+void print_undetermined(std::ostream& out, const FitStatistics& statistics) {
+  for (const std::string& words : statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
+}
+
+Json identifiability_of(const FitStatistics& s) {
+  return {{"condition_number", s.condition_number}, {"unidentifiable", s.unidentifiable}};
+}
+
 Json to_json(const FittedParameter& p) {
   Json json{{"initial", p.initial},
             {"value", p.value},
@@ -185,6 +196,21 @@ Json to_json(const ParameterProfile& p) {
 
 }  // namespace
 
+void print_preflight(std::ostream& out, const IdentificationResult& start) {
+  TextTable parameters({"parameter", "start", "predicted std error", "unit"});
+  for (const FittedParameter& p : start.parameters)
+    parameters.add({p.name, significant(p.initial), error_of(p), p.unit.empty() ? "-" : p.unit});
+  out << '\n' << parameters.text();
+  print_undetermined(out, start.statistics);
+  out << "\npredicted at the start, with the sigmas as given; nothing was fitted\n";
+}
+
+void add_preflight(Json& result, const IdentificationResult& start) {
+  for (const FittedParameter& p : start.parameters)
+    result["preflight"]["parameters"][p.name] = {{"start", p.initial}, {"predicted_std_error", p.std_error}};
+  result["identifiability"] = identifiability_of(start.statistics);
+}
+
 void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort) {
   TextTable parameters({"parameter", "initial", "value", "std error", "95 % interval", "unit", "at bound"});
   add_rows(parameters, fit.parameters);
@@ -205,7 +231,7 @@ void print_fit(std::ostream& out, const IdentificationResult& fit, const std::st
   print_influences(out, fit);
   const FitStatistics& s = fit.statistics;
   if (fit.parameters.size() > 1) out << '\n' << determined_in_words(fit) << '\n';
-  for (const std::string& words : s.unidentifiable) out << "not determined by the data: " << words << '\n';
+  print_undetermined(out, s);
   if (!s.none.empty()) out << fmt::format("no standard errors and intervals: {}\n", s.none);
   out << '\n';
   if (s.none.empty()) out << fmt::format("standard errors: {}\n", s.covariance_in_words());
@@ -281,8 +307,7 @@ void add_to_result(Json& result, const IdentificationResult& fit) {
                           {"aic", fit.aic},
                           {"bic", fit.bic}};
   for (const ParameterProfile& p : fit.profiles) result["profiles"][p.name] = to_json(p);
-  result["identifiability"] = {{"condition_number", fit.statistics.condition_number},
-                               {"unidentifiable", fit.statistics.unidentifiable}};
+  result["identifiability"] = identifiability_of(fit.statistics);
   if (const FitStatistics& s = fit.statistics; s.singular_values.size() > 0) {
     Json& determined = result["identifiability"];
     determined["singular_values"] = std::vector<double>(s.singular_values.begin(), s.singular_values.end());

@@ -11,6 +11,10 @@
 
 namespace mbsopt {
 
+// The report before the fit: what the data would determine at the start with the given sigmas.
+void print_preflight(std::ostream& out, const IdentificationResult& start);
+void add_preflight(Json& result, const IdentificationResult& start);  // preflight.parameters; identifiability
+
 // effort is the text of effort() in multistart.hpp.
 void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort);
 void print_recovery(std::ostream& out, const Recovery& recovery);
