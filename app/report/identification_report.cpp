@@ -262,37 +262,27 @@ LinePlot histogram(const FitPlot& fit) {
           .series = {found, normal}};
 }
 
-// Residuals without gaps: of one record, or of one of its windows.
-std::vector<std::vector<double>> parts_of(const std::vector<double>& residual) {
-  std::vector<std::vector<double>> parts(1);
-  for (const double z : residual) {
-    if (std::isfinite(z))
-      parts.back().push_back(z);
-    else if (!parts.back().empty())
-      parts.emplace_back();
-  }
-  return parts;
-}
-
 // r_k = sum_i z_i z_{i+k} / sum_i z_i^2 about the mean, without pairs across a gap. White noise has 95 % within
 // +-1.96/sqrt(n).
 LinePlot autocorrelation(const FitPlot& fit) {
   constexpr std::size_t kMostLags = 40;
-  const std::vector<std::vector<double>> parts = parts_of(fit.residual);
-  std::size_t samples = 0, longest = 0;
+  std::vector<std::size_t> part, lengths{0};  // of each residual: its part without gaps; samples of each part
+  std::size_t samples = 0;
   double mean = 0, power = 0;
-  for (const std::vector<double>& z : parts) {
-    samples += z.size(), longest = std::max(longest, z.size());
-    for (const double value : z) mean += value;
+  for (const double z : fit.residual) {
+    part.push_back(lengths.size());
+    if (std::isfinite(z))
+      ++samples, ++lengths.back(), mean += z;
+    else
+      lengths.push_back(0);
   }
   mean /= static_cast<double>(samples);
-  for (const std::vector<double>& z : parts)
-    for (const double value : z) power += (value - mean) * (value - mean);
+  std::vector<double> e = fit.residual;  // about the mean, 0 in a gap
+  for (double& z : e) z = std::isfinite(z) ? z - mean : 0, power += z * z;
   PlotSeries r{"autocorrelation", {}, {}, Mark::bars, {}, data_colour(fit)};
-  for (std::size_t lag = 1; lag <= std::min(kMostLags, longest / 4); ++lag) {
+  for (std::size_t lag = 1; lag <= std::min(kMostLags, std::ranges::max(lengths) / 4); ++lag) {
     double sum = 0;
-    for (const std::vector<double>& z : parts)
-      for (std::size_t i = 0; i + lag < z.size(); ++i) sum += (z[i] - mean) * (z[i + lag] - mean);
+    for (std::size_t i = 0; i + lag < e.size(); ++i) sum += part[i] == part[i + lag] ? e[i] * e[i + lag] : 0;
     r.x.push_back(static_cast<double>(lag)), r.y.push_back(power > 0 ? sum / power : 0);
   }
   const double limit = 1.96 / std::sqrt(static_cast<double>(samples));
