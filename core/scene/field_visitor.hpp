@@ -1,5 +1,5 @@
-// The visitor (core/scene/vocabulary.hpp) that finds the expressions and the points of an object with their places. It
-// serves functions that ask what the object depends on.
+// The visitor (core/scene/vocabulary.hpp) that finds the expressions of an object with their places, its points, and
+// the names of other objects. It serves functions that ask what the object depends on.
 #pragma once
 
 #include <string>
@@ -16,19 +16,26 @@ struct FieldPlace {
   bool in_named_point = false, in_drawing = false;
 };
 
-// on_expression(const FieldPlace&, const Expression&, Names) and on_point(const std::string& body, const std::string&
-// name) for points that are used by name. Definitions are left out: they count where they are used.
-template <class OnExpression, class OnPoint>
+// on_expression(const FieldPlace&, const Expression&, Names), on_point(const std::string& body, const std::string&
+// name) for points that are used by name, and on_reference(To, const std::string& name). Definitions are left out: they
+// count where they are used.
+template <class OnExpression, class OnPoint, class OnReference = decltype([](To, const std::string&) {})>
 class FieldVisitor {
  public:
-  FieldVisitor(OnExpression on_expression, OnPoint on_point)
-      : on_expression_(std::move(on_expression)), on_point_(std::move(on_point)) {}
+  FieldVisitor(OnExpression on_expression, OnPoint on_point, OnReference on_reference = {})
+      : on_expression_(std::move(on_expression)),
+        on_point_(std::move(on_point)),
+        on_reference_(std::move(on_reference)) {}
 
   void name(std::string_view, const std::string&, const Says&) {}
   void text(std::string_view, const std::string&, const Says&) {}
   void texts(std::string_view, const std::vector<std::string>&, const Says&) {}
-  void reference(std::string_view, const std::string&, To, const Says&) {}
-  void references(std::string_view, const std::vector<std::string>&, To, const Says&) {}
+  void reference(std::string_view, const std::string& name, To to, const Says& says) {
+    if (says.need != Need::unknown) on_reference_(to, name);
+  }
+  void references(std::string_view, const std::vector<std::string>& names, To to, const Says&) {
+    for (const std::string& name : names) on_reference_(to, name);
+  }
   void reference_or(std::string_view, const std::string&, To, const Says&, auto&&) {}
   void word(std::string_view, const std::string&, const Words&, const Says&) {}
   template <class T, std::size_t N>
@@ -141,6 +148,7 @@ class FieldVisitor {
 
   OnExpression on_expression_;
   OnPoint on_point_;
+  OnReference on_reference_;
   std::string path_;
   bool in_named_point_ = false, in_drawing_ = false;
 };

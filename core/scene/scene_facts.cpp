@@ -32,6 +32,12 @@ std::map<std::string, const T*> by_name(const std::vector<T>& all) {
 }
 
 template <class T>
+const T* found(const std::map<std::string, const T*>& table, const std::string& name) {
+  const auto it = table.find(name);
+  return it == table.end() ? nullptr : it->second;
+}
+
+template <class T>
 std::vector<std::string> names_of(const std::vector<T>& all) {
   std::vector<std::string> names;
   for (const T& one : all) names.push_back(one.name);
@@ -138,25 +144,11 @@ double SceneFacts::value_at(const Program& program) const {
   return program.value(values_, scratch_);
 }
 
-const Body* SceneFacts::body(const std::string& name) const {
-  const auto it = bodies_.find(name);
-  return it == bodies_.end() ? nullptr : it->second;
-}
-
-const Joint* SceneFacts::joint(const std::string& name) const {
-  const auto it = joints_.find(name);
-  return it == joints_.end() ? nullptr : it->second;
-}
-
-const Force* SceneFacts::force(const std::string& name) const {
-  const auto it = forces_.find(name);
-  return it == forces_.end() ? nullptr : it->second;
-}
-
-const Sensor* SceneFacts::sensor(const std::string& name) const {
-  const auto it = sensors_.find(name);
-  return it == sensors_.end() ? nullptr : it->second;
-}
+const Body* SceneFacts::body(const std::string& name) const { return found(bodies_, name); }
+const Joint* SceneFacts::joint(const std::string& name) const { return found(joints_, name); }
+const Drive* SceneFacts::drive(const std::string& name) const { return found(drives_, name); }
+const Force* SceneFacts::force(const std::string& name) const { return found(forces_, name); }
+const Sensor* SceneFacts::sensor(const std::string& name) const { return found(sensors_, name); }
 
 std::vector<std::string> SceneFacts::names(To what) const {
   switch (what) {
@@ -188,7 +180,7 @@ bool SceneFacts::has(To what, const std::string& name) const {
     case To::joint:
       return joint(name);
     case To::drive:
-      return drives_.contains(name);
+      return drive(name);
     case To::force:
       return force(name);
     case To::sensor:
@@ -321,14 +313,6 @@ std::vector<std::string> SceneFacts::used_names(const Expression& expression, co
   const Program program(expression, symbols);
   for (const int input : program.used_inputs()) names.push_back(symbols.input_names()[static_cast<std::size_t>(input)]);
   return names;
-}
-
-std::vector<const Sensor*> SceneFacts::measured_by(const Sensor& measured) const {
-  if (!is_expression(measured)) return {&measured};
-  std::vector<const Sensor*> all;
-  for (const std::string& name : used_names(measured.value, objective_))
-    if (const Sensor* const below = sensor(name)) all.push_back(below);
-  return all;
 }
 
 Reads SceneFacts::reads_of(const Sensor& measured) const {

@@ -27,6 +27,7 @@ class SceneFacts {
   // Return nullptr if nothing has that name. The ground counts as no body.
   const Body* body(const std::string& name) const;
   const Joint* joint(const std::string& name) const;
+  const Drive* drive(const std::string& name) const;
   const Force* force(const std::string& name) const;
   const Sensor* sensor(const std::string& name) const;
   std::vector<std::string> names(To what) const;  // objectives: those added with add_objectives
@@ -60,9 +61,6 @@ class SceneFacts {
 
   std::optional<Dimension> dimension_of_name(const std::string& name) const;  // nullopt: not known
 
-  // The sensors, none of them an expression, that an expression sensor measures by. Any other sensor measures by
-  // itself.
-  std::vector<const Sensor*> measured_by(const Sensor& sensor) const;
   // An expression reads the largest of these. An expression of velocities is not linear in them, and reads the state.
   Reads reads_of(const Sensor& sensor) const;
   std::optional<Dimension> dimension_of(const Sensor& sensor,

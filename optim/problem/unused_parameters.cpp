@@ -1,9 +1,10 @@
 #include "optim/problem/unused_parameters.hpp"
 
 #include <algorithm>
-#include <map>
 #include <numeric>
 #include <set>
+#include <unordered_map>
+#include <utility>
 
 #include "core/force/bound_force.hpp"
 #include "core/scene/field_visitor.hpp"
@@ -16,170 +17,72 @@ namespace mbsopt {
 
 namespace {
 
-template <class Kind>
-concept ForceOfJoint = requires(const Kind& kind) {
-  kind.joint;
-};
-template <class Kind>
-concept ForceBetweenBodies = requires(const Kind& kind) {
-  kind.body1;
+// The names in the fields of elements, and in those of the joints, drives, forces and sensors that these name. Of a
+// body only the name counts, since its fields belong to the body alone.
+struct Mentions {
+  std::set<std::string> parameters, bodies;
+  bool whole = false;  // a quantity of all bodies
+  std::set<std::pair<To, std::string>> elements;
 };
 
-// Sets of bodies that joints, forces and conditions connect. Make all connections before a query. The ground is no body
-// here.
-class ConnectedBodies {
+class MentionSearch {
  public:
-  explicit ConnectedBodies(const Scene& scene) : parent_(scene.bodies.size()) {
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-    for (std::size_t i = 0; i < scene.bodies.size(); ++i) index_.emplace(scene.bodies[i].name, i);
-  }
+  explicit MentionSearch(const Scene& scene) : facts_(scene) {}
 
-  void connect(const std::vector<std::string>& bodies) {
-    std::optional<std::size_t> first;
-    for (const std::string& body : bodies) {
-      const auto it = index_.find(body);
-      if (it == index_.end()) continue;
-      const std::size_t root = root_of(it->second);
-      if (first) parent_[root] = *first;
-      first = root_of(root);
+  template <class T>
+  Mentions of(const T& element) const {
+    Mentions found;
+    add(element, found);
+    return found;
+  }
+  template <class T>
+  void add(const T& element, Mentions& found) const {
+    describe_to(found, element);
+  }
+  void add(const Body& body, Mentions& found) const {
+    found.bodies.insert(body.name);
+    describe_to(found, body);
+  }
+  void add(Force force, Mentions& found) const {
+    std::visit(
+        [](auto& kind) {
+          if constexpr (requires { kind.law; })
+            if (kind.law) drop_coefficients(kind);
+        },
+        force.kind);
+    describe_to(found, force);
+    if (const auto* const user = std::get_if<UserForceSpec>(&force.kind))
+      for (const std::string& body : bodies_of(*user)) add(To::body, body, found);
+  }
+  void add(const Sensor& sensor, Mentions& found) const {
+    found.whole = found.whole || measures_everything(sensor);
+    describe_to(found, sensor);
+  }
+  void add(const ObjectiveSpec& objective, Mentions& found) const {
+    found.whole = found.whole || objective.eigenvalue || (objective.user && objective.user->bodies.empty());
+    describe_to(found, objective);
+  }
+  void add(const Expression& expression, Names names, Mentions& found) const {
+    if (expression.is_number()) return;
+    const Symbols& symbols = facts_.symbols(names);
+    const Program program(expression, symbols);
+    for (const int input : program.used_inputs()) {
+      const std::string& name = symbols.input_names()[static_cast<std::size_t>(input)];
+      if (input < facts_.symbols(Names::none).inputs())
+        found.parameters.insert(name);
+      else if (names == Names::objective || names == Names::sensor || names == Names::state)
+        add(To::sensor, name, found);
     }
-  }
-  void look_at(const std::vector<std::string>& bodies) {
-    for (const std::string& body : bodies)
-      if (const auto it = index_.find(body); it != index_.end()) seen_.insert(root_of(it->second));
-  }
-  void look_at_all() {
-    for (std::size_t i = 0; i < parent_.size(); ++i) seen_.insert(root_of(i));
-  }
-  // Returns whether any of them is connected with an observed body.
-  bool matter(const std::vector<std::string>& bodies) {
-    for (const std::string& body : bodies)
-      if (const auto it = index_.find(body); it != index_.end() && seen_.contains(root_of(it->second))) return true;
-    return false;
-  }
-  bool any_seen() const { return !seen_.empty(); }
-
- private:
-  std::size_t root_of(std::size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-
-  std::vector<std::size_t> parent_;
-  std::map<std::string, std::size_t> index_;
-  std::set<std::size_t> seen_;  // roots
-};
-
-class FieldSearch {
- public:
-  explicit FieldSearch(const Problem& problem)
-      : problem_(problem), scene_(problem.scene), facts_(scene_), bodies_(scene_) {}
-
-  std::set<std::string> used_parameters() {
-    connect_bodies();
-    const bool judged_by_anything = !problem_.objectives.empty() || problem_.identification;
-    if (judged_by_anything) {
-      collect(problem_.objectives);
-      if (problem_.identification) collect(problem_.identification->experiments);
-    } else {
-      for (const Sensor& sensor : scene_.sensors) use_sensor(sensor.name);
-      bodies_.look_at_all();
-    }
-    collect_model();
-    return used_;
-  }
-
-  // The scene without bodies that no objective depends on, and without elements that act on these alone.
-  Scene needed(std::vector<std::string>& left_out) {
-    used_parameters();
-    Scene needed = scene_;
-    const auto idle = [this](const auto& part) { return !bodies_.matter(bodies_of(part)); };
-    for (const Body& body : scene_.bodies)
-      if (!bodies_.matter({body.name})) left_out.push_back(body.name);
-    if (left_out.empty() || left_out.size() == scene_.bodies.size()) return left_out.clear(), needed;
-    std::erase_if(needed.bodies, [this](const Body& body) { return !bodies_.matter({body.name}); });
-    std::erase_if(needed.joints, idle);
-    std::erase_if(needed.drives, idle);
-    std::erase_if(needed.forces, idle);
-    std::erase_if(needed.conditions, [&](const Condition& condition) {
-      const Sensor* const sensor = facts_.sensor(condition.sensor);
-      return sensor && idle(*sensor);
-    });
-    const std::set<std::string> gone(left_out.begin(), left_out.end());
-    std::erase_if(needed.sensors, [&](const Sensor& sensor) { return reads(sensor, gone); });
-    return needed;
   }
 
  private:
-  // Returns whether the sensor reads one of the bodies; it may also read others.
-  bool reads(const Sensor& sensor, const std::set<std::string>& bodies) const {
-    if (measures_everything(sensor)) return false;
-    const std::vector<std::string> read = bodies_of(sensor);
-    return std::any_of(read.begin(), read.end(), [&](const std::string& body) { return bodies.contains(body); });
-  }
-
-  std::vector<std::string> bodies_of_joint(const std::string& name) const {
-    const Joint* const joint = facts_.joint(name);
-    return joint ? bodies_of(*joint) : std::vector<std::string>{};
-  }
-  std::vector<std::string> bodies_of(const Joint& joint) const {
-    if (!ties_joints(joint)) return {joint.body1, joint.body2};
-    std::vector<std::string> all;
-    for (const std::string& name : {joint.joint1, joint.joint2}) {
-      const Joint* const tied = facts_.joint(name);
-      if (tied && !ties_joints(*tied)) all.insert(all.end(), {tied->body1, tied->body2});
-    }
-    return all;
-  }
-  std::vector<std::string> bodies_of(const Drive& drive) const {
-    std::vector<std::string> all = bodies_of_joint(drive.joint);
-    all.insert(all.end(), {drive.body, drive.body1, drive.body2});
-    return all;
-  }
-
-  std::vector<std::string> bodies_of(const Force& force) const {
-    return std::visit([this](const auto& kind) { return bodies_of(kind); }, force.kind);
-  }
-  template <class Kind>
-  std::vector<std::string> bodies_of(const Kind& kind) const {
-    if constexpr (ForceOfJoint<Kind>) {
-      return bodies_of_joint(kind.joint);
-    } else if constexpr (ForceBetweenBodies<Kind>) {
-      return {kind.body1, kind.body2};
-    } else if constexpr (std::is_same_v<Kind, UserForceSpec>) {
-      return mbsopt::bodies_of(kind);
-    } else {  // on one body, of which its sensors may make it depend on others
-      std::vector<std::string> all{kind.body};
-      for (const Expression& component : kind.components)
-        for (const std::string& name : component.names())
-          if (const Sensor* sensor = facts_.sensor(name))
-            for (const std::string& body : bodies_of(*sensor)) all.push_back(body);
-      return all;
-    }
-  }
-
-  std::vector<std::string> bodies_of(const Sensor& measured) const {
-    std::vector<std::string> all;
-    for (const Sensor* const sensor : facts_.measured_by(measured)) {
-      const std::vector<std::string> read = bodies_read_by(*sensor);
-      all.insert(all.end(), read.begin(), read.end());
-    }
-    return all;
-  }
-  std::vector<std::string> bodies_read_by(const Sensor& sensor) const {
-    std::vector<std::string> all = bodies_of_joint(sensor.joint);
-    if (measures_everything(sensor))
-      for (const Body& body : scene_.bodies) all.push_back(body.name);
-    if (const Force* force = facts_.force(sensor.force))
-      for (const std::string& body : bodies_of(*force)) all.push_back(body);
-    for (const std::string& body : {sensor.body, sensor.body1, sensor.body2}) all.push_back(body);
-    if (sensor.relative_to) all.push_back(sensor.relative_to->body);
-    for (const Drive& drive : scene_.drives) {
-      if (drive.name != sensor.drive) continue;
-      const std::vector<std::string> driven = bodies_of(drive);
-      all.insert(all.end(), driven.begin(), driven.end());
-    }
-    return all;
+  // A law replaces the coefficients.
+  static void drop_coefficients(auto& kind) {
+    kind.stiffness = kind.damping = 0.0;
+    if constexpr (requires { kind.free_length; })
+      kind.free_length = kind.actuator = 0.0;
+    else
+      kind.free_angle = 0.0;
   }
   // A quantity that names no part of the mechanism is one of the whole.
   static bool measures_everything(const Sensor& sensor) {
@@ -188,124 +91,145 @@ class FieldSearch {
     return row && std::ranges::all_of(kParts, [&](const char* part) { return need_of(*row, part) == Need::unknown; });
   }
 
-  void connect_bodies() {
-    for (const Joint& joint : scene_.joints) bodies_.connect(bodies_of(joint));
-    for (const Drive& drive : scene_.drives) bodies_.connect(bodies_of(drive));
-    for (const Force& force : scene_.forces) bodies_.connect(bodies_of(force));
-    for (const Condition& condition : scene_.conditions)
-      if (const Sensor* sensor = facts_.sensor(condition.sensor)) bodies_.connect(bodies_of(*sensor));
-  }
-
-  template <class T>
-  void collect(const T& object) {
+  void describe_to(Mentions& found, const auto& element) const {
     FieldVisitor visitor(
-        [this](const FieldPlace& at, const Expression& e, Names names) {
-          if (!at.in_named_point && !at.in_drawing) use(e, names);
+        [&](const FieldPlace& at, const Expression& expression, Names names) {
+          if (!at.in_named_point && !at.in_drawing) add(expression, names, found);
         },
-        [this](const std::string& body, const std::string& point) { use_point(body, point); });
-    describe(visitor, object);
+        [&](const std::string& body, const std::string& point) { add_point(body, point, found); },
+        [&](To to, const std::string& name) { add(to, name, found); });
+    describe(visitor, element);
   }
-  void collect(const std::vector<ObjectiveSpec>& objectives) {
-    for (const ObjectiveSpec& objective : objectives) {
-      collect(objective);
-      for (const TrackTerm& term : objective.track) use_sensor(term.sensor);
-      if (objective.eigenvalue || (objective.user && objective.user->bodies.empty())) bodies_.look_at_all();
-      if (objective.user) bodies_.look_at(objective.user->bodies);
-    }
-  }
-  void collect(const std::vector<ExperimentSpec>& experiments) {
-    for (const ExperimentSpec& experiment : experiments) {
-      for (const ChannelSpec& channel : experiment.channels) {
-        collect(channel);
-        use_sensor(channel.sensor);
-      }
-      for (const DriveLaw& law : experiment.drives) collect(law);
-    }
-  }
-
-  void use(const Expression& expression, Names names) {
-    if (expression.is_number()) return;
-    const Symbols& symbols = facts_.symbols(names);
-    const Program program(expression, symbols);
-    for (const int input : program.used_inputs()) {
-      const std::string& name = symbols.input_names()[static_cast<std::size_t>(input)];
-      if (input < facts_.symbols(Names::none).inputs())
-        used_.insert(name);
-      else if (names == Names::objective || names == Names::sensor || names == Names::state)
-        use_sensor(name);
-    }
-  }
-
-  void use_point(const std::string& body, const std::string& point) {
+  void add_point(const std::string& body, const std::string& point, Mentions& found) const {
     const Body* const owner = facts_.body(body);
     if (!owner) return;
     if (const auto it = owner->points.find(point); it != owner->points.end())
-      for (const Field& field : it->second) use(field, Names::none);
+      for (const Field& field : it->second) add(field, Names::none, found);
+  }
+  void add(To to, const std::string& name, Mentions& found) const {
+    const auto add_if_any = [&](const auto* element) {
+      if (element && found.elements.emplace(to, name).second) add(*element, found);
+    };
+    if (to == To::body && facts_.body(name)) found.bodies.insert(name);
+    if (to == To::joint) add_if_any(facts_.joint(name));
+    if (to == To::drive) add_if_any(facts_.drive(name));
+    if (to == To::force) add_if_any(facts_.force(name));
+    if (to == To::sensor) add_if_any(facts_.sensor(name));  // "t" is none
   }
 
-  void use_sensor(const std::string& name) {
-    const Sensor* const sensor = facts_.sensor(name);  // "t" is none
-    if (!sensor || !used_sensors_.insert(name).second) return;
-    collect(*sensor);
-    if (measures_everything(*sensor))
-      bodies_.look_at_all();
-    else
-      bodies_.look_at(bodies_of(*sensor));
-    if (const Force* force = facts_.force(sensor->force)) collect_force(*force);
-    // A joint's angle also depends on the joint's own axes and normals.
-    if (const Joint* joint = facts_.joint(sensor->joint)) collect(*joint);
-  }
-
-  void collect_model() {
-    if (bodies_.any_seen())
-      for (const Field& field : scene_.gravity) use(field, Names::none);
-    for (const Body& body : scene_.bodies)
-      if (bodies_.matter({body.name})) collect(body);
-    for (const Joint& joint : scene_.joints)
-      if (bodies_.matter(bodies_of(joint))) collect(joint);
-    for (const Drive& drive : scene_.drives)
-      if (bodies_.matter(bodies_of(drive))) collect(drive);
-    for (const Force& force : scene_.forces)
-      if (bodies_.matter(bodies_of(force))) collect_force(force);
-    for (const Condition& condition : scene_.conditions) {
-      const Sensor* const sensor = facts_.sensor(condition.sensor);
-      if (!sensor || !bodies_.matter(bodies_of(*sensor))) continue;
-      collect(condition);
-      collect(*sensor);
-    }
-  }
-
-  // A law replaces the coefficients.
-  void collect_force(Force force) {
-    std::visit(
-        [](auto& kind) {
-          if constexpr (requires { kind.law; }) {
-            if (!kind.law) return;
-            kind.stiffness = kind.damping = 0.0;
-            if constexpr (requires { kind.free_length; })
-              kind.free_length = kind.actuator = 0.0;
-            else
-              kind.free_angle = 0.0;
-          }
-        },
-        force.kind);
-    collect(force);
-  }
-
-  const Problem& problem_;
-  const Scene& scene_;
   SceneFacts facts_;
+};
+
+// Sets of bodies that joints, forces and conditions connect. Make all connections before a query. The ground is no body
+// here.
+class ConnectedBodies {
+ public:
+  explicit ConnectedBodies(const std::vector<Body>& bodies) : parent_(bodies.size()), is_observed_(bodies.size()) {
+    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
+    for (std::size_t i = 0; i < bodies.size(); ++i) index_.emplace(bodies[i].name, i);
+  }
+
+  void connect(const Mentions& mentions) {
+    const std::vector<std::size_t> bodies = roots_of(mentions);
+    for (const std::size_t body : bodies) parent_[root_of(body)] = root_of(bodies.front());
+  }
+  void observe(const Mentions& mentions) {
+    for (const std::size_t body : roots_of(mentions)) is_observed_[body] = true;
+  }
+  // Returns whether any of the bodies is connected with an observed one.
+  bool matter(const Mentions& mentions) {
+    return std::ranges::any_of(roots_of(mentions), [&](std::size_t body) { return is_observed_[body]; });
+  }
+
+ private:
+  std::vector<std::size_t> roots_of(const Mentions& mentions) {
+    std::vector<std::size_t> roots;
+    if (mentions.whole)
+      for (std::size_t i = 0; i < parent_.size(); ++i) roots.push_back(root_of(i));
+    else
+      for (const std::string& body : mentions.bodies) roots.push_back(root_of(index_.at(body)));
+    return roots;
+  }
+  std::size_t root_of(std::size_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+
+  std::vector<std::size_t> parent_;
+  std::vector<bool> is_observed_;  // of roots
+  std::unordered_map<std::string, std::size_t> index_;
+};
+
+// What the objectives and measurements of a problem depend on. Without any, a sensor of everything takes their place.
+class Reach {
+ public:
+  explicit Reach(const Problem& problem) : scene_(problem.scene), search_(scene_), bodies_(scene_.bodies) {
+    std::vector<Mentions> model;
+    const auto add = [&](const auto& elements) {
+      for (const auto& element : elements) bodies_.connect(model.emplace_back(search_.of(element)));
+    };
+    add(scene_.bodies), add(scene_.joints), add(scene_.drives), add(scene_.forces), add(scene_.conditions);
+    Mentions observed = observed_by(problem);
+    bodies_.observe(observed);
+    if (observed.whole || !observed.bodies.empty())
+      for (const Field& field : scene_.gravity) search_.add(field, Names::none, observed);
+    for (Mentions& element : model)
+      if (bodies_.matter(element)) observed.parameters.merge(element.parameters);
+    parameters_ = std::move(observed.parameters);
+  }
+
+  const std::set<std::string>& parameters() const { return parameters_; }
+
+  // The scene without bodies that nothing observed depends on, and without elements that act on these alone.
+  Scene needed(std::vector<std::string>& left_out) {
+    const auto is_idle = [&](const auto& element) { return !bodies_.matter(search_.of(element)); };
+    std::set<std::string> gone;
+    for (const Body& body : scene_.bodies)
+      if (is_idle(body)) left_out.push_back(body.name), gone.insert(body.name);
+    Scene needed = scene_;
+    if (left_out.empty() || left_out.size() == scene_.bodies.size()) return left_out.clear(), needed;
+    std::erase_if(needed.bodies, is_idle);
+    std::erase_if(needed.joints, is_idle);
+    std::erase_if(needed.drives, is_idle);
+    std::erase_if(needed.forces, is_idle);
+    std::erase_if(needed.conditions, is_idle);
+    std::erase_if(needed.sensors, [&](const Sensor& sensor) {
+      const std::set<std::string> read = search_.of(sensor).bodies;
+      return std::ranges::any_of(read, [&](const std::string& body) { return gone.contains(body); });
+    });
+    return needed;
+  }
+
+ private:
+  Mentions observed_by(const Problem& problem) const {
+    Mentions observed;
+    for (const ObjectiveSpec& objective : problem.objectives) search_.add(objective, observed);
+    if (problem.identification)
+      for (const ExperimentSpec& experiment : problem.identification->experiments) {
+        for (const ChannelSpec& channel : experiment.channels) search_.add(channel, observed);
+        for (const DriveLaw& law : experiment.drives)
+          if (!law.samples) search_.add(law.law, Names::time_law, observed);
+      }
+    if (problem.objectives.empty() && !problem.identification) {
+      for (const Sensor& sensor : scene_.sensors) search_.add(sensor, observed);
+      observed.whole = true;
+    }
+    return observed;
+  }
+
+  const Scene& scene_;
+  MentionSearch search_;
   ConnectedBodies bodies_;
-  std::set<std::string> used_, used_sensors_;
+  std::set<std::string> parameters_;
 };
 
 // The parameters in use in the problem or in one of its load cases, by the names of the problem.
 std::set<std::string> used_in(const Problem& problem) {
   std::set<std::string> used;
-  if (problem.cases.empty() || problem.identification) used = FieldSearch(problem).used_parameters();
+  if (problem.cases.empty() || problem.identification) used = Reach(problem).parameters();
   for (const CaseSpec& load_case : problem.cases) {
     const Problem of_case = problem_of(problem, load_case);
-    const std::set<std::string> names = FieldSearch(of_case).used_parameters();
+    const std::set<std::string> names = Reach(of_case).parameters();
     for (std::size_t k = 0; k < problem.scene.parameters.size(); ++k)
       if (names.contains(of_case.scene.parameters[k].name)) used.insert(problem.scene.parameters[k].name);
   }
@@ -349,7 +273,7 @@ void add_idle(const std::vector<std::string>& variables, const Problem& judged_b
 std::set<std::string> used_anywhere(const Problem& problem) {
   Problem model_only;
   model_only.scene = problem.scene;
-  return FieldSearch(model_only).used_parameters();
+  return Reach(model_only).parameters();
 }
 
 // This counts coefficients that a law replaces, too.
@@ -390,7 +314,7 @@ void allow_what_only_measurements_use(Problem& problem) {
   const std::set<std::string> used = used_in(problem);
   Problem judged = problem;
   judged.identification.reset(), judged.cases.clear();
-  const std::set<std::string> by_objectives = FieldSearch(judged).used_parameters();
+  const std::set<std::string> by_objectives = Reach(judged).parameters();
   for (Parameter& p : problem.scene.parameters)
     p.allow_unused = p.allow_unused || (used.contains(p.name) && !by_objectives.contains(p.name));
 }
@@ -403,7 +327,7 @@ Problem what_objectives_need(const Problem& problem, std::vector<std::string>* l
   if (!problem.objectives.empty() && !opaque) {
     Problem judged = problem;
     judged.identification.reset();
-    needed.scene = FieldSearch(judged).needed(names);
+    needed.scene = Reach(judged).needed(names);
   }
   if (left_out) *left_out = std::move(names);
   return needed;
@@ -413,7 +337,7 @@ Problem what_measurements_need(const Problem& problem, std::vector<std::string>*
   Problem needed = problem;
   std::vector<std::string> names;
   if (problem.identification) {
-    needed.scene = FieldSearch(as_identified(problem)).needed(names);
+    needed.scene = Reach(as_identified(problem)).needed(names);
     const auto has = [](const Scene& scene, const std::string& drive) {
       return std::any_of(scene.drives.begin(), scene.drives.end(), [&](const Drive& d) { return d.name == drive; });
     };
