@@ -68,7 +68,6 @@ JsonPointRecords::JsonPointRecords(const std::vector<Json>& points, const std::v
       const auto n = static_cast<Eigen::Index>(x.size());
       NlpHessians& known = hessians_[x];
       for (const Json& matrix : json.at("of")) known.of.push_back(matrix_of(matrix, n, n));
-      if (json.contains("third_order")) known.third_order = matrix_of(json["third_order"], n, n);
     }
   });
   points_left_ = points_.size();
@@ -104,9 +103,7 @@ bool JsonPointRecords::recall(const VectorXd& x, NlpHessians& hessians) {
 void JsonPointRecords::record(const VectorXd& x, const NlpHessians& hessians) {
   Json of = Json::array();
   for (const MatrixXd& H : hessians.of) of.push_back(to_json(H));
-  Json json{{"x", as_vector(x)}, {"of", of}};
-  if (hessians.third_order) json["third_order"] = to_json(*hessians.third_order);
-  tell_("hessians", json);
+  tell_("hessians", {{"x", as_vector(x)}, {"of", of}});
 }
 
 }  // namespace mbsopt

@@ -209,26 +209,4 @@ bool DesignProgram::hessians(const VectorXd& x, std::vector<MatrixXd>& H) {
   return true;
 }
 
-bool DesignProgram::gradient_beside(const VectorXd& x, const VectorXd& d, VectorXd& f_x) {
-  const CaseEvaluation& at = evaluation(rho_at(x));
-  if (!at.ok) return false;
-  const VectorXd rho = rho_at(x + d);
-  const Index cases = static_cast<Index>(evaluator_.cases());
-  VectorXd psi(cases);
-  MatrixXd psi_rho(cases, variables());
-  std::vector<Evaluation> there(evaluator_.cases());
-  evaluator_.for_each_case([&](std::size_t c) {
-    const Evaluation& of_case = at.of_cases[c];
-    there[c] = evaluator_.of_case(c).gradients_on(of_case.steps, rho, of_case.method);
-  });
-  hessian_gradients_ += cases;
-  for (Index c = 0; c < cases; ++c) {
-    const Evaluation& e = there[static_cast<std::size_t>(c)];
-    if (!e.ok) return false;
-    psi(c) = e.psi(0), psi_rho.row(c) = e.psi_rho.row(0);
-  }
-  f_x = (psi_rho.transpose() * objective_.gradient(psi)).cwiseProduct(scaling_.rho_x(x + d));
-  return true;
-}
-
 }  // namespace mbsopt

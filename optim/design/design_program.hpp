@@ -36,7 +36,6 @@ class DesignProgram : public NonlinearProgram {
   void evaluate(const Eigen::VectorXd& x, NlpPoint& point) override;
   void evaluate_values(const Eigen::VectorXd& x, NlpPoint& point) override;
   bool hessians(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override;
-  bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) override;
 
   // The evaluation with gradients at rho: the one that was kept, or a new one.
   CaseEvaluation evaluation(const Eigen::VectorXd& rho);

@@ -20,7 +20,6 @@
 #include "optim/solver/search_watch.hpp"
 #include "optim/solver/secant_curvature.hpp"
 #include "optim/solver/stationary_point.hpp"
-#include "optim/solver/third_order_step.hpp"
 
 namespace mbsopt {
 namespace {
@@ -231,30 +230,12 @@ class Adapter : public Ipopt::TNLP {
   // The Hessian of f. If it is not positive definite and there are no constraints, BFGS replaces it: negative curvature
   // holds for a short distance only. Ipopt would add a multiple of the identity that shortens all steps; the gradients
   // of the iterates cover a longer distance. BFGS also corrects Gauss-Newton's Hessian if it contradicts the change of
-  // the gradient. The third derivative along their step corrects exact Hessians.
+  // the gradient.
   Eigen::MatrixXd for_steps() const {
     const Eigen::MatrixXd& of_f = hessians_.of[0];
     if (problem_.constraints() > 0) return of_f;
     if (options_.gauss_newton && secants_.contradicts(of_f)) return secants_.matrix_from(of_f);
-    if (cholesky_factor(of_f).size() > 0) return hessians_.third_order.value_or(of_f);
-    return secants_.matrix();
-  }
-
-  void add_third_order(const Eigen::VectorXd& x, NlpHessians& hessians) {
-    if (problem_.constraints() > 0 || options_.gauss_newton || !evaluate(x)) return;
-    const Eigen::MatrixXd& H = hessians.of[0];
-    const Eigen::VectorXd f_x = point_->f_x, at = points_.x();
-    const std::optional<Eigen::VectorXd> d = newton_step(problem_, at, f_x, H);
-    Eigen::VectorXd there;
-    if (!d || !found_beside(at, *d, there)) return;
-    hessians.third_order = third_order_hessian(H, *d, 2 * (there - f_x - H * *d));
-  }
-  bool found_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) {
-    try {
-      return problem_.gradient_beside(x, d, f_x);
-    } catch (const std::exception&) {
-      return false;
-    }
+    return cholesky_factor(of_f).size() > 0 ? of_f : secants_.matrix();
   }
 
   void update_hessians(const Eigen::VectorXd& x) {
@@ -263,11 +244,9 @@ class Adapter : public Ipopt::TNLP {
     bool ok = options_.records && options_.records->recall(x, found);
     if (!ok) {
       ok = problem_.hessians(x, found.of);
-      if (ok) add_third_order(x, found);
       if (ok && options_.records) options_.records->record(x, found);
     }
     if (ok) hessians_ = std::move(found);
-    if (!ok) hessians_.third_order.reset();
     if (hessians_.of.empty()) {
       const Eigen::Index n = problem_.variables();
       hessians_.of.assign(static_cast<std::size_t>(problem_.constraints()) + 1, Eigen::MatrixXd::Zero(n, n));

@@ -14,7 +14,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <limits>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,16 +60,6 @@ struct NonlinearProgram {
   // Sets second derivatives of f, then of each c: n x n each. Returns false if there are none.
   virtual bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>&) { return false; }
 
-  // Sets f_x at x + d, within the bounds. A simulation uses the steps of x, so that differences are smooth. Returns
-  // false if it fails.
-  virtual bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) {
-    NlpPoint p;
-    p.f_x.setZero(x.size()), p.c.setZero(constraints()), p.c_x.setZero(constraints(), x.size());
-    evaluate(x + d, p);
-    f_x = p.f_x;
-    return p.ok;
-  }
-
   Eigen::Index variables() const { return x_lower.size(); }
   Eigen::Index constraints() const { return c_lower.size(); }
   // The largest amount by which a constraint is violated.
@@ -93,8 +82,7 @@ struct NonlinearProgram {
 
 // The Hessians at one point.
 struct NlpHessians {
-  std::vector<Eigen::MatrixXd> of;             // f, and each constraint
-  std::optional<Eigen::MatrixXd> third_order;  // takes the place of f's in a step of third order
+  std::vector<Eigen::MatrixXd> of;  // f, and each constraint
 };
 
 // The points of an earlier run, and a place to record new ones: a killed run continues from there.
