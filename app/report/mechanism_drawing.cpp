@@ -70,7 +70,7 @@ struct View {
 };
 
 // The drawing shows a joint at its point on the ground, or else on its second body.
-const BodyPoint& drawn_point(const SketchedJoint& joint) {
+const SketchPoint& drawn_point(const SketchedJoint& joint) {
   return joint.on_body1.body == kGround ? joint.on_body1 : joint.on_body2;
 }
 
@@ -84,7 +84,7 @@ std::optional<View> view_of(std::array<int, 2> plane, const std::vector<DrawnSke
   Eigen::AlignedBox2d box;
   View view{plane};
   bool finite = true;
-  const auto extend = [&](const DrawnState& state, const BodyPoint& p) {
+  const auto extend = [&](const DrawnState& state, const SketchPoint& p) {
     const Point2 at = view.flat(placed(state.row, p));
     box.extend(at);
     finite = finite && at.allFinite();
@@ -94,7 +94,7 @@ std::optional<View> view_of(std::array<int, 2> plane, const std::vector<DrawnSke
       for (const Point3& s : sketch.bodies[i]) extend(state, {i, s});
     for (const SketchedJoint& joint : sketch.joints) extend(state, drawn_point(joint));
     for (const SketchedSpring& spring : sketch.springs)
-      for (const BodyPoint& end : {spring.from, spring.to}) extend(state, end);
+      for (const SketchPoint& end : {spring.from, spring.to}) extend(state, end);
   }
   const double width = std::max(box.sizes().x(), 1e-12), height = std::max(box.sizes().y(), 1e-12);
   view.scale = std::min((kWidth - 2 * kMargin) / width, (kLargestHeight - 2 * kMargin - kTitle) / height);
@@ -175,7 +175,7 @@ void draw_state(const DrawnSketch& drawn, const DrawnSketch& first, const View& 
       svg += name_beside(hull, middle_of(outline_of(first, i, view)), state.scene.bodies[i].name);
   }
   for (const SketchedJoint& joint : sketch.joints) {
-    const BodyPoint at = drawn_point(joint);
+    const SketchPoint at = drawn_point(joint);
     const Point2 p = view(placed(state.row, at));
     if (at.body == kGround)
       svg += fmt::format("<path class=\"ground\" d=\"M{0:.1f} {1:.1f}l-7 12h14Z\"/>\n", p.x(), p.y());

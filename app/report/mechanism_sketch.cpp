@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-BodyPoint point_by_facts(const SceneFacts& facts, const std::string& body, const PointField& field) {
+SketchPoint point_by_facts(const SceneFacts& facts, const std::string& body, const PointField& field) {
   const auto s = facts.value(field, body);
   const auto& bodies = facts.scene().bodies;
   const auto found = std::ranges::find(bodies, body, &Body::name);
@@ -42,12 +42,12 @@ class SketchMaker {
   }
 
  private:
-  BodyPoint point(const std::string& body, const PointField& field) const {
+  SketchPoint point(const std::string& body, const PointField& field) const {
     return point_by_facts(facts_, body, field);
   }
 
   void add_joint(const Joint& joint) {
-    const BodyPoint p1 = point(joint.body1, joint.point1), p2 = point(joint.body2, joint.point2);
+    const SketchPoint p1 = point(joint.body1, joint.point1), p2 = point(joint.body2, joint.point2);
     add(p1), add(p2);
     std::optional<Vector3d> axis;
     if (joint.axis1) axis = point(joint.body1, *joint.axis1).s;
@@ -55,7 +55,7 @@ class SketchMaker {
   }
 
   void add_spring(const Tsda& tsda) {
-    const BodyPoint p1 = point(tsda.body1, tsda.point1), p2 = point(tsda.body2, tsda.point2);
+    const SketchPoint p1 = point(tsda.body1, tsda.point1), p2 = point(tsda.body2, tsda.point2);
     add(p1), add(p2);
     const auto acts = [&](const Field& coefficient) { return facts_.value(coefficient).value_or(1) != 0; };
     result_.springs.push_back({p1, p2, tsda.law || acts(tsda.stiffness), acts(tsda.damping)});
@@ -66,7 +66,7 @@ class SketchMaker {
     if (!sensor.body1.empty() && !sensor.body2.empty())
       add(point(sensor.body1, sensor.point1)), add(point(sensor.body2, sensor.point2));
     if (sensor.quantity != "position") return;
-    const BodyPoint p = point(sensor.body, sensor.point);
+    const SketchPoint p = point(sensor.body, sensor.point);
     const auto same = [&](const TracedPoint& t) { return t.point.body == p.body && t.point.s == p.s; };
     if (p.body == kGround || std::ranges::any_of(result_.traces, same)) return;
     const std::string* const name = std::get_if<std::string>(&sensor.point);
@@ -79,14 +79,14 @@ class SketchMaker {
     for (const auto& [name, coordinates] : body.points)
       if (!directions_.contains(name)) add(point(body.name, coordinates));
     for (const Shape& shape : body.shapes) {
-      const BodyPoint from = point(body.name, shape.from), to = point(body.name, shape.to);
+      const SketchPoint from = point(body.name, shape.from), to = point(body.name, shape.to);
       add(from), add(to);
       result_.shapes.push_back({index, shape.type, from.s, to.s, shape.radius});
     }
     if (result_.bodies[index].size() < 2) add(point(body.name, body.com));
   }
 
-  void add(const BodyPoint& p) {
+  void add(const SketchPoint& p) {
     if (p.body != kGround) result_.bodies[p.body].push_back(p.s);
   }
 
@@ -100,11 +100,11 @@ class SketchMaker {
 
 Sketch sketch_of(const Scene& scene) { return SketchMaker(scene).sketch(); }
 
-BodyPoint point_of(const Scene& scene, const std::string& body, const PointField& point) {
+SketchPoint point_of(const Scene& scene, const std::string& body, const PointField& point) {
   return point_by_facts(SceneFacts(scene), body, point);
 }
 
-Vector3d placed(const std::vector<double>& row, const BodyPoint& p) {
+Vector3d placed(const std::vector<double>& row, const SketchPoint& p) {
   if (p.body == kGround) return p.s;
   const double* const b = row.data() + 1 + 13 * p.body;
   const Eigen::Vector4d e(b[3], b[4], b[5], b[6]);

@@ -14,26 +14,26 @@ namespace mbsopt {
 inline constexpr std::size_t kGround = static_cast<std::size_t>(-1);
 
 // A point of a body, in that body's frame.
-struct BodyPoint {
+struct SketchPoint {
   std::size_t body;  // its number, or kGround
   Eigen::Vector3d s;
 };
 
 struct SketchedJoint {
   std::string type;
-  BodyPoint on_body1, on_body2;
+  SketchPoint on_body1, on_body2;
   std::optional<Eigen::Vector3d> axis;  // in body 1
 };
 
 struct SketchedSpring {
-  BodyPoint from, to;
+  SketchPoint from, to;
   bool spring, damper;  // whether each of them acts
 };
 
 // The point of a position sensor, whose path is drawn.
 struct TracedPoint {
   std::string name;
-  BodyPoint point;
+  SketchPoint point;
 };
 
 struct SketchedShape {
@@ -55,9 +55,9 @@ struct Sketch {
 Sketch sketch_of(const Scene& scene);
 
 // A point of a body of the scene, or of the ground.
-BodyPoint point_of(const Scene& scene, const std::string& body, const PointField& point);
+SketchPoint point_of(const Scene& scene, const std::string& body, const PointField& point);
 
 // Global position of a point, from a trajectory's row: t, then 13 numbers per body.
-Eigen::Vector3d placed(const std::vector<double>& row, const BodyPoint& p);
+Eigen::Vector3d placed(const std::vector<double>& row, const SketchPoint& p);
 
 }  // namespace mbsopt

@@ -19,9 +19,9 @@ constexpr std::size_t kPose = 7;              // x y z e0 e1 e2 e3
 
 std::string vector_of(const Eigen::Vector3d& v) { return fmt::format("[{:.6g},{:.6g},{:.6g}]", v.x(), v.y(), v.z()); }
 
-long number_of(const BodyPoint& p) { return p.body == kGround ? -1 : static_cast<long>(p.body); }
+long number_of(const SketchPoint& p) { return p.body == kGround ? -1 : static_cast<long>(p.body); }
 
-std::string ends_of(const BodyPoint& p1, const BodyPoint& p2) {
+std::string ends_of(const SketchPoint& p1, const SketchPoint& p2) {
   return fmt::format(R"("b1":{},"p1":{},"b2":{},"p2":{})", number_of(p1), vector_of(p1.s), number_of(p2),
                      vector_of(p2.s));
 }
@@ -92,7 +92,7 @@ std::string reactions_json(PageArrays& arrays, const MovingState& state) {
     const std::string name = forces.columns[k].substr(0, forces.columns[k].size() - 2);  // "A.x"
     const auto joint = std::ranges::find(state.scene.joints, name, &Joint::name);
     if (joint == state.scene.joints.end()) continue;
-    const BodyPoint on = point_of(state.scene, joint->body2, joint->point2);
+    const SketchPoint on = point_of(state.scene, joint->body2, joint->point2);
     joints.push_back(fmt::format(R"({{"b":{},"p":{},"force":[{},{},{}]}})", number_of(on), vector_of(on.s),
                                  arrays.add(column(k)), arrays.add(column(k + 1)), arrays.add(column(k + 2))));
   }

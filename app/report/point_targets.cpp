@@ -30,7 +30,7 @@ std::vector<PointTarget> point_targets(const Scene& scene, const std::vector<Sen
       continue;
     const std::size_t axis = std::string_view("xyz").find(sensor->component);
     if (sensor->component.size() != 1 || axis > 2) continue;
-    const BodyPoint point = point_of(scene, sensor->body, sensor->point);
+    const SketchPoint point = point_of(scene, sensor->body, sensor->point);
     const std::size_t stride = (v.t.size() + kMostTimes - 1) / kMostTimes;
     const std::vector<double> t = every(v.t, stride);
     auto target = std::ranges::find_if(targets, [&](const PointTarget& other) {

@@ -15,7 +15,7 @@ namespace mbsopt {
 
 // One point over time. Global coordinates [m] that are neither prescribed nor measured are empty.
 struct PointTarget {
-  BodyPoint point;
+  SketchPoint point;
   bool measured = false;
   std::vector<double> t = {};  // [s], ascending
   std::array<std::vector<double>, 3> place = {};
