@@ -17,7 +17,7 @@ namespace mbsopt {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kTitle = "Runs";
+constexpr const char* kIndexTitle = "Runs";
 // A sweep or a study may keep far more than a comparison needs. Its reading would delay every command by a second.
 constexpr std::size_t kLargest = 20'000'000;  // [bytes] of result.json
 
@@ -58,7 +58,7 @@ std::string address_of(const std::string& folder) {
 }
 
 // The numbers by which two runs are compared have names: "objective path [m^2]", "parameter k1 [N/m]", ...
-Json numbers_of(const Json& result) {
+Json compared_numbers(const Json& result) {
   Json numbers = Json::object();
   const Json objectives = result.value("objectives", Json::object()),  // items() refers to them
       parameters = result.value("parameters", Json::object());
@@ -82,7 +82,7 @@ Json numbers_of(const Json& result) {
 std::string run_index(const fs::path& folder) {
   const std::vector<StoredRun> runs = runs_in(folder);
   if (runs.empty()) return {};
-  HtmlPage page(kTitle);
+  HtmlPage page(kIndexTitle);
   page.heading("All runs");
   std::vector<TableRow> rows;
   Json compared = Json::array();
@@ -91,7 +91,7 @@ std::string run_index(const fs::path& folder) {
     if (run.has_report) name.link = address_of(run.folder) + "/report.html";
     rows.push_back({name, cell(run.result.value("command", Json())), cell(run.result.value("status", Json())),
                     std::to_string(run.result.value("warnings", Json::array()).size())});
-    compared.push_back({{"name", run.folder}, {"numbers", numbers_of(run.result)}});
+    compared.push_back({{"name", run.folder}, {"numbers", compared_numbers(run.result)}});
   }
   page.table({"folder", "command", "status", "warnings"}, rows);
   if (runs.size() > 1) page.comparison(json_text(compared));
@@ -103,7 +103,8 @@ void write_run_index(const fs::path& folder) {
   std::error_code ignored;
   if (fs::exists(file, ignored)) {
     try {
-      if (content_of_regular_file(file).find(fmt::format("<title>{}</title>", kTitle)) == std::string::npos) return;
+      if (content_of_regular_file(file).find(fmt::format("<title>{}</title>", kIndexTitle)) == std::string::npos)
+        return;
     } catch (const FileError&) {
       return;
     }
