@@ -21,11 +21,7 @@ constexpr std::size_t kUpright = 2;  // letters of a name that stands upright ab
 constexpr std::size_t kFewColumns = 8;  // they fit a printed page of 18 cm without breaks within words
 
 // Writes words as the value of an attribute.
-std::string list_of(const std::vector<std::string>& words) {
-  std::vector<std::string> quoted;
-  for (const std::string& word : words) quoted.push_back(json_quoted(word));
-  return html_escaped(fmt::format("[{}]", fmt::join(quoted, ",")));
-}
+std::string list_of(const std::vector<std::string>& words) { return html_escaped(json_list(words, json_quoted)); }
 
 // breaks allows several lines of text.
 std::string cell_of(const TableCell& cell, bool words, bool breaks) {
@@ -44,28 +40,14 @@ std::string cell_of(const TableCell& cell, bool words, bool breaks) {
 
 }  // namespace
 
-void HtmlPage::verdict(std::string_view text) {
-  body_ += fmt::format("<p class=\"verdict\">{}</p>\n", html_words(text));
-}
-
-void HtmlPage::warning(std::string_view text) {
-  body_ += fmt::format("<p class=\"warning\">Warning: {}</p>\n", html_words(text));
+void HtmlPage::add(std::string_view opening, std::string_view text, std::string_view closing) {
+  body_ += fmt::format("{}{}{}", opening, html_words(text), closing);
 }
 
 void HtmlPage::heading(std::string_view text) {
   headings_.emplace_back(text);
   body_ += fmt::format("<h2 id=\"part{}\">{}</h2>\n", headings_.size(), html_escaped(text));
 }
-
-void HtmlPage::paragraph(std::string_view text) { body_ += fmt::format("<p>{}</p>\n", html_words(text)); }
-
-void HtmlPage::note(std::string_view text) { body_ += fmt::format("<p class=\"note\">{}</p>\n", html_words(text)); }
-
-void HtmlPage::banner(std::string_view text) {
-  body_ += fmt::format("<p class=\"banner\" role=\"alert\">{}</p>\n", html_words(text));
-}
-
-void HtmlPage::code(std::string_view text) { body_ += fmt::format("<code>{}</code>\n", html_words(text)); }
 
 void HtmlPage::table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense) {
   if (rows.empty()) return;
@@ -79,19 +61,13 @@ void HtmlPage::table(const std::vector<std::string>& header, const std::vector<T
                            : header.size() > kFewColumns ? " class=\"wide\""
                                                          : "";
   body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", kind);
-  if (named) {
-    body_ += "<thead><tr>";
-    for (std::size_t k = 0; k < header.size(); ++k) {
-      const bool is_short = dense && header[k].size() <= kUpright;
-      body_ += fmt::format("<th{}>{}</th>",
-                           words[k]   ? " class=\"words\""
-                           : is_short ? " class=\"upright\""
-                                      : "",
-                           html_escaped(header[k]));
-    }
-    body_ += "</tr></thead>\n";
+  if (named) body_ += "<thead><tr>";
+  for (std::size_t k = 0; k < header.size() && named; ++k) {
+    const bool upright = dense && header[k].size() <= kUpright;
+    const char* const style = words[k] ? " class=\"words\"" : upright ? " class=\"upright\"" : "";
+    body_ += fmt::format("<th{}>{}</th>", style, html_escaped(header[k]));
   }
-  body_ += "<tbody>";
+  body_ += named ? "</tr></thead>\n<tbody>" : "<tbody>";
   for (const TableRow& row : rows) {
     body_ += "<tr>";
     for (std::size_t k = 0; k < row.size(); ++k) {

@@ -32,13 +32,15 @@ class HtmlPage {
  public:
   explicit HtmlPage(std::string title) : title_(std::move(title)) {}
 
-  void verdict(std::string_view text);  // one sentence with the numbers that matter most
-  void warning(std::string_view text);
   void heading(std::string_view text);
-  void paragraph(std::string_view text);
-  void note(std::string_view text);    // in small print
-  void banner(std::string_view text);  // text that a reader must see first
-  void code(std::string_view text);
+  // One sentence with the numbers that matter most.
+  void verdict(std::string_view text) { add("<p class=\"verdict\">", text); }
+  void warning(std::string_view text) { add("<p class=\"warning\">Warning: ", text); }
+  void paragraph(std::string_view text) { add("<p>", text); }
+  void note(std::string_view text) { add("<p class=\"note\">", text); }  // in small print
+  // Text that a reader must see first.
+  void banner(std::string_view text) { add("<p class=\"banner\" role=\"alert\">", text); }
+  void code(std::string_view text) { add("<code>", text, "</code>\n"); }
   // The first column holds names; the others are numbers or short words. A dense table has narrow columns, for colours.
   void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense = false);
   template <class Text>
@@ -64,6 +66,8 @@ class HtmlPage {
   std::string text() const;
 
  private:
+  void add(std::string_view opening, std::string_view text, std::string_view closing = "</p>\n");
+
   std::string title_, body_, compared_ = "[]";
   std::vector<std::string> headings_, plots_, motions_;
   PageArrays arrays_;

@@ -1,35 +1,19 @@
 #include "app/report/html_text.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 
 #include "app/files/json_text.hpp"
 
 namespace mbsopt {
-namespace {
-
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
-}  // namespace
 
 std::string html_escaped(std::string_view text) {
   std::string escaped;
   for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
+    const std::size_t special = std::string_view("&<>\"").find(c);
+    escaped +=
+        special == std::string_view::npos ? std::string(1, c) : std::array{"&amp;", "&lt;", "&gt;", "&quot;"}[special];
   }
   return escaped;
 }
@@ -40,7 +24,8 @@ std::string html_words(std::string_view text) {
     const std::size_t end = text[begin] == ' ' ? begin + 1 : std::min(text.find(' ', begin), text.size());
     const std::string_view word = text.substr(begin, end - begin);
     const std::size_t exponent = word.find("e-");
-    const bool number = exponent != std::string_view::npos && exponent > 0 && is_digit(word[exponent - 1]);
+    const bool number = exponent != std::string_view::npos && exponent > 0 &&
+                        std::isdigit(static_cast<unsigned char>(word[exponent - 1]));
     const std::string escaped = html_escaped(word);
     words +=
         number || (word.starts_with('-') && word.size() > 1) ? "<span class=\"whole\">" + escaped + "</span>" : escaped;

@@ -5,19 +5,15 @@
 
 #include <cmath>
 
+#include "app/report/html_text.hpp"
+
 namespace mbsopt {
 
 std::size_t PageArrays::add(const std::vector<double>& values, int digits) {
-  std::string text = "[";
-  for (const double value : values) {
-    if (text.size() > 1) text += ',';
-    if (std::isfinite(value)) {
-      text += fmt::format("{:.{}g}", value, digits);
-    } else {
-      text += "null";
-    }
-  }
-  const auto [at, is_new] = numbers_.emplace(text + "]", texts_.size());
+  const std::string text = json_list(values, [&](double value) {
+    return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : std::string("null");
+  });
+  const auto [at, is_new] = numbers_.emplace(text, texts_.size());
   if (is_new) texts_.push_back(at->first);
   return at->second;
 }
