@@ -1,7 +1,6 @@
 #include "app/report/line_plot.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -56,9 +55,27 @@ struct PlotFrame {
 double x_of(const LinePlot& plot, double value) { return plot.logarithmic_x ? std::log10(value) : value; }
 double y_of(const LinePlot& plot, double value) { return plot.logarithmic_y ? std::log10(value) : value; }
 
-bool is_cloud(const PlotSeries& series) {
-  return series.mark == Mark::points || series.mark == Mark::rings || series.mark == Mark::crosses;
+// The position of a sample on the axes, unless it is not finite.
+std::optional<std::pair<double, double>> place_of(const LinePlot& plot, const PlotSeries& series, std::size_t sample) {
+  const double x = x_of(plot, series.x[sample]), y = y_of(plot, series.y[sample]);
+  return std::isfinite(x) && std::isfinite(y) ? std::optional(std::pair(x, y)) : std::nullopt;
 }
+
+struct MarkStyle {
+  const char *name, *style;         // in the page's data; its class
+  const char *key, *drawn;          // paths: in the legend, which ends with `drawn`; at each sample, if it has a symbol
+  double left = 0, up = 0, on = 0;  // of the sample, where the symbol begins; how far on it ends [px]
+};
+constexpr MarkStyle kMarks[] = {{"line", "line", "M0 5H30", ""},  // in the order of Mark
+                                {"dashed", "line dashed", "M0 5H30", ""},
+                                {"points", "points", "M5 5h0M15 5h0M25 5", "h0"},
+                                {"rings", "line", "M11 5", "a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", 4},
+                                {"bars", "bars", "M15 0V10", ""},
+                                {"crosses", "cross", "M10 0", "l10 10m-10 0l10 -10", 5, 5, 10}};
+
+const MarkStyle& mark_of(const PlotSeries& series) { return kMarks[static_cast<int>(series.mark)]; }
+
+bool is_cloud(const PlotSeries& series) { return *mark_of(series).drawn != 0; }
 
 // The part of the width beside the outermost marks, so that the frame cuts none of them: 4 px of 200.
 constexpr double kAirOfMarks = 0.02;
@@ -67,10 +84,10 @@ PlotFrame frame_of(const LinePlot& plot) {
   PlotFrame frame;
   for (const PlotSeries& series : plot.series) {
     for (std::size_t i = 0; i < series.x.size(); ++i) {
-      const double x = x_of(plot, series.x[i]), y = y_of(plot, series.y[i]);
-      if (!std::isfinite(x) || !std::isfinite(y)) continue;
-      frame.x.include(x);
-      frame.y.include(y);
+      const auto place = place_of(plot, series, i);
+      if (!place) continue;
+      frame.x.include(place->first);
+      frame.y.include(place->second);
       if (series.mark == Mark::bars) frame.y.include(0);
     }
   }
@@ -103,14 +120,11 @@ std::vector<std::size_t> random_samples(const std::vector<std::size_t>& all, con
   if (all.size() <= kMostPoints) return all;
   std::vector<std::size_t> kept;
   std::sample(all.begin(), all.end(), std::back_inserter(kept), kMostPoints, std::mt19937());
-  const auto less = [&](std::size_t a, std::size_t b) {
-    return y[a] < y[b] || (std::isnan(y[b]) && !std::isnan(y[a]));
+  const auto or_else = [&](double missing) {
+    return [&y, missing](std::size_t i) { return std::isnan(y[i]) ? missing : y[i]; };
   };
-  const auto greater = [&](std::size_t a, std::size_t b) {
-    return y[a] > y[b] || (std::isnan(y[b]) && !std::isnan(y[a]));
-  };
-  kept.push_back(*std::min_element(all.begin(), all.end(), less));
-  kept.push_back(*std::min_element(all.begin(), all.end(), greater));
+  kept.push_back(*std::ranges::min_element(all, {}, or_else(INFINITY)));
+  kept.push_back(*std::ranges::max_element(all, {}, or_else(-INFINITY)));
   return kept;
 }
 
@@ -143,26 +157,6 @@ std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries&
   return kept;
 }
 
-const char* style_of(Mark mark) {
-  switch (mark) {
-    case Mark::points:
-      return "points";
-    case Mark::dashed:
-      return "line dashed";
-    case Mark::bars:
-      return "bars";
-    case Mark::crosses:
-      return "cross";
-    case Mark::line:
-    case Mark::rings:
-      break;
-  }
-  return "line";
-}
-
-constexpr const char* kRing = "a4 4 0 1 0 8 0a4 4 0 1 0 -8 0";  // from its left end
-constexpr const char* kCross = "l10 10m-10 0l10 -10";           // from its upper left end
-
 // The d of an SVG path. It contains differences in tenths of a px, which are half as long as positions. They lead to
 // rounded positions, so that rounding errors do not add up.
 class PathText {
@@ -170,10 +164,10 @@ class PathText {
   void move(double px, double py) { go('m', px, py); }
   void line(double px, double py) { go('l', px, py); }
   // Draws at the position and ends there.
-  void mark(double px, double py, const char* drawn, double dx = 0, double dy = 0) {
-    move(px, py);
-    text_ += drawn, command_ = 0;
-    x_ += std::lround(10 * dx), y_ += std::lround(10 * dy);
+  void mark(double px, double py, const MarkStyle& mark) {
+    move(px - mark.left, py - mark.up);
+    text_ += mark.drawn, command_ = 0;
+    x_ += std::lround(10 * mark.on);
   }
   const std::string& text() const { return text_; }
 
@@ -209,26 +203,19 @@ void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index
   PathText path;
   bool pen_down = false;
   for (const std::size_t i : visible_samples(plot, series, frame)) {
-    const double x = x_of(plot, series.x[i]), y = y_of(plot, series.y[i]);
-    if (!std::isfinite(x) || !std::isfinite(y)) {
-      pen_down = false;
-      continue;
-    }
-    const double px = frame.px(x), py = frame.py(y);
-    if (series.mark == Mark::points) {
-      path.mark(px, py, "h0");
-    } else if (series.mark == Mark::rings) {
-      path.mark(px - 4, py, kRing);
-    } else if (series.mark == Mark::crosses) {
-      path.mark(px - 5, py - 5, kCross, 10);
+    const auto place = place_of(plot, series, i);
+    const bool connected = std::exchange(pen_down, place.has_value());
+    if (!place) continue;
+    const double px = frame.px(place->first), py = frame.py(place->second);
+    if (is_cloud(series)) {
+      path.mark(px, py, mark_of(series));
     } else if (series.mark == Mark::bars) {
       path.move(px, frame.py(0)), path.line(px, py);
     } else {
-      pen_down ? path.line(px, py) : path.move(px, py);
+      connected ? path.line(px, py) : path.move(px, py);
     }
-    pen_down = true;
   }
-  svg += fmt::format("<path data-series=\"{}\" class=\"{} c{}\" d=\"{}\"/>\n", index, style_of(series.mark),
+  svg += fmt::format("<path data-series=\"{}\" class=\"{} c{}\" d=\"{}\"/>\n", index, mark_of(series).style,
                      colour_of(series, index), path.text());
 }
 
@@ -240,8 +227,9 @@ std::string area_beyond(const LinePlot& plot, const PlotFrame& frame, const Plot
   bool any = false;
   double last = 0;
   for (const std::size_t i : visible_samples(plot, series, frame)) {
-    const double x = x_of(plot, series.x[i]), y = y_of(plot, series.y[i]);
-    if (!std::isfinite(x) || !std::isfinite(y)) continue;
+    const auto place = place_of(plot, series, i);
+    if (!place) continue;
+    const auto [x, y] = *place;
     const bool beyond = limit.upper ? y > y_limit : y < y_limit;
     any = any || beyond;
     if (path.text().empty()) path.move(frame.px(x), frame.py(y_limit));
@@ -283,9 +271,7 @@ void draw_instants(const LinePlot& plot, const PlotFrame& frame, std::string& sv
 }
 
 // Returns whether 0.02, 5, 1000 is a fit form for all ticks of an axis.
-bool near_one(const std::vector<double>& ticks) {
-  return std::all_of(ticks.begin(), ticks.end(), [](double tick) { return tick > 0.9e-3 && tick < 1.1e4; });
-}
+bool near_one(const std::vector<double>& ticks) { return ticks.front() > 0.9e-3 && ticks.back() < 1.1e4; }
 
 // 10 with a raised exponent, which reads better than 1e-12.
 std::string power_of_ten(double value) {
@@ -297,45 +283,26 @@ std::string power_of_ten(double value) {
 // Positions on an axis (logarithms if it is logarithmic) and their labels.
 using Ticks = std::vector<std::pair<double, std::string>>;
 
-Ticks ticks_of(const std::vector<double>& values, const AxisRange& range) {
+Ticks ticks_of(const AxisRange& range, bool logarithmic, int count, bool whole = false) {
+  const std::vector<double> values = logarithmic
+                                         ? logarithmic_ticks(std::pow(10, range.low), std::pow(10, range.high), count)
+                                         : round_ticks(range.low, range.high, count);
   Ticks ticks;
-  for (const double value : values) ticks.emplace_back(value, fmt::format("{:.{}g}", value, range.digits()));
+  for (const double value : values) {
+    if (!logarithmic && !(whole && value != std::round(value)))
+      ticks.emplace_back(value, fmt::format("{:.{}g}", value, range.digits()));
+    if (logarithmic)
+      ticks.emplace_back(std::log10(value), near_one(values) ? fmt::format("{:.6g}", value) : power_of_ten(value));
+  }
   return ticks;
-}
-
-Ticks logarithmic_ticks_of(const AxisRange& range, int count) {
-  Ticks ticks;
-  const std::vector<double> values = logarithmic_ticks(std::pow(10, range.low), std::pow(10, range.high), count);
-  for (const double value : values)
-    ticks.emplace_back(std::log10(value), near_one(values) ? fmt::format("{:.6g}", value) : power_of_ten(value));
-  return ticks;
-}
-
-Ticks y_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
-  if (plot.logarithmic_y) return logarithmic_ticks_of(frame.y, 6);
-  return ticks_of(round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6), frame.y);
 }
 
 Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
+  if (plot.x_names.empty()) return ticks_of(frame.x, plot.logarithmic_x, 8, plot.whole_x);
   Ticks names;
   for (const std::string& name : plot.x_names)
     names.emplace_back(static_cast<double>(names.size()), html_escaped(name));
-  if (!names.empty()) return names;
-  if (plot.logarithmic_x) return logarithmic_ticks_of(frame.x, 8);
-  std::vector<double> values = round_ticks(frame.x.low, frame.x.high, 8);
-  if (plot.whole_x) std::erase_if(values, [](double x) { return x != std::round(x); });
-  return ticks_of(values, frame.x);
-}
-
-// Draws the key in the style of the series.
-std::string legend_key(const PlotSeries& series, std::size_t index) {
-  const std::string path = series.mark == Mark::points    ? "M5 5h0M15 5h0M25 5h0"
-                           : series.mark == Mark::rings   ? std::string("M11 5") + kRing
-                           : series.mark == Mark::bars    ? "M15 0V10"
-                           : series.mark == Mark::crosses ? std::string("M10 0") + kCross
-                                                          : "M0 5H30";
-  return fmt::format("<svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" d=\"{}\"/></svg>",
-                     style_of(series.mark), colour_of(series, index), path);
+  return names;
 }
 
 void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
@@ -346,20 +313,19 @@ void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
     grid += fmt::format("M{:.1f} {}V{}", px, kTop, bottom);
     x_labels += fmt::format("<text x=\"{:.1f}\" y=\"{}\">{}</text>", px, bottom + 16, label);
   }
-  for (const auto& [tick, label] : y_ticks_of(plot, frame)) {
+  for (const auto& [tick, label] :
+       ticks_of(frame.y, plot.logarithmic_y, plot.logarithmic_y || !plot.equal_axes ? 6 : 5)) {
     const double py = frame.py(tick);
     grid += fmt::format("M{} {:.1f}H{}", kLeft, py, right);
     y_labels += fmt::format("<text x=\"{}\" y=\"{:.1f}\">{}</text>", kLeft - 6, py + 4, label);
   }
   svg += fmt::format(
       "<g class=\"ticks\"><path class=\"grid\" d=\"{}\"/>\n<g text-anchor=\"middle\">{}</g>\n"
-      "<g text-anchor=\"end\">{}</g></g>\n",
-      grid, x_labels, y_labels);
-  svg += fmt::format("<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n", kLeft, kTop, kInnerWidth,
-                     kInnerHeight);
-  svg += fmt::format("<text class=\"x-label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",
-                     kLeft + kInnerWidth / 2, kPlotHeight - 8, html_escaped(plot.x_label));
-  svg += fmt::format("<text class=\"y-label\" x=\"4\" y=\"16\">{}</text>\n", html_escaped(plot.y_label));
+      "<g text-anchor=\"end\">{}</g></g>\n<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n"
+      "<text class=\"x-label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n"
+      "<text class=\"y-label\" x=\"4\" y=\"16\">{}</text>\n",
+      grid, x_labels, y_labels, kLeft, kTop, kInnerWidth, kInnerHeight, kLeft + kInnerWidth / 2, kPlotHeight - 8,
+      html_escaped(plot.x_label), html_escaped(plot.y_label));
 }
 
 // Says which part of long series the plot draws.
@@ -418,9 +384,13 @@ std::string to_svg(const LinePlot& plot) {
   if (plot.series.size() > 1) {
     svg += "<div class=\"legend\">";
     for (std::size_t i = 0; i < plot.series.size(); ++i) {
-      if (plot.series[i].part_of) continue;
-      svg += fmt::format("<span data-series=\"{}\">{}{}</span>", i, legend_key(plot.series[i], i),
-                         html_escaped(plot.series[i].name));
+      const PlotSeries& series = plot.series[i];
+      const MarkStyle& mark = mark_of(series);
+      if (series.part_of) continue;
+      svg += fmt::format(
+          "<span data-series=\"{}\"><svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" "
+          "d=\"{}{}\"/></svg>{}</span>",
+          i, mark.style, colour_of(series, i), mark.key, mark.drawn, html_escaped(series.name));
     }
     svg += "</div>\n";
   }
@@ -429,28 +399,26 @@ std::string to_svg(const LinePlot& plot) {
 
 std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
   constexpr int kTimeDigits = 9;  // of x: 1000.001 s and 1000.002 s are two instants
-  const char* const kMarks[] = {"line", "dashed", "points", "rings", "bars", "crosses"};
   const PlotFrame frame = frame_of(plot);
-  std::vector<std::string> series, limits, instants, names;
-  for (const std::string& name : plot.x_names) names.push_back(json_quoted(name));
-  for (const PlotSeries& s : plot.series) {
+  const auto series_json = [&](const PlotSeries& s) {
     std::vector<double> x, y;
     for (const std::size_t i : visible_samples(plot, s, frame)) x.push_back(s.x[i]), y.push_back(s.y[i]);
-    series.push_back(fmt::format(R"({{"name":{},"mark":"{}","part":{},"x":{},"y":{}}})", json_quoted(s.name),
-                                 kMarks[static_cast<int>(s.mark)], s.part_of ? static_cast<long>(*s.part_of) : -1,
-                                 arrays.add(x, std::max(kTimeDigits, frame.x.digits())),
-                                 arrays.add(y, frame.y.digits())));
-  }
-  for (const PlotLimit& limit : plot.limits)
-    limits.push_back(
-        fmt::format(R"({{"name":{},"value":{:.9g},"upper":{}}})", json_quoted(limit.name), limit.value, limit.upper));
-  for (const PlotInstant& instant : plot.instants)
-    instants.push_back(fmt::format(R"({{"name":{},"x":{:.9g}}})", json_quoted(instant.name), instant.x));
+    return fmt::format(R"({{"name":{},"mark":"{}","part":{},"x":{},"y":{}}})", json_quoted(s.name), mark_of(s).name,
+                       s.part_of ? static_cast<long>(*s.part_of) : -1,
+                       arrays.add(x, std::max(kTimeDigits, frame.x.digits())), arrays.add(y, frame.y.digits()));
+  };
+  const auto limit_json = [](const PlotLimit& limit) {
+    return fmt::format(R"({{"name":{},"value":{:.9g},"upper":{}}})", json_quoted(limit.name), limit.value, limit.upper);
+  };
+  const auto instant_json = [](const PlotInstant& instant) {
+    return fmt::format(R"({{"name":{},"x":{:.9g}}})", json_quoted(instant.name), instant.x);
+  };
   return fmt::format(R"({{"x":[{},{}],"y":[{},{}],"logx":{},"logy":{},"whole":{},"equal":{},"xlabel":{},"ylabel":{},)"
-                     R"("series":[{}],"limits":[{}],"instants":[{}],"names":[{}]}})",
+                     R"("series":{},"limits":{},"instants":{},"names":{}}})",
                      frame.x.low, frame.x.high, frame.y.low, frame.y.high, plot.logarithmic_x, plot.logarithmic_y,
                      plot.whole_x, plot.equal_axes, json_quoted(plot.x_label), json_quoted(plot.y_label),
-                     fmt::join(series, ","), fmt::join(limits, ","), fmt::join(instants, ","), fmt::join(names, ","));
+                     json_list(plot.series, series_json), json_list(plot.limits, limit_json),
+                     json_list(plot.instants, instant_json), json_list(plot.x_names, json_quoted));
 }
 
 }  // namespace mbsopt

@@ -76,10 +76,11 @@ std::string drawing_of(const RowPlot& plot, const RowLayout& at) {
                        at.stacked ? at.width - at.words - 4 : at.width - at.words + 10, text,
                        at.stacked ? "end" : "start", squeezed, html_escaped(row.words));
   }
-  svg += fmt::format("<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\"/>\n", at.names, kRowsTop,
-                     inner, bottom - kRowsTop);
-  return svg + fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n</svg>\n",
-                           at.names + inner / 2, bottom + 36, html_escaped(plot.x_label));
+  return svg + fmt::format(
+                   "<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\"/>\n"
+                   "<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n</svg>\n",
+                   at.names, kRowsTop, inner, bottom - kRowsTop, at.names + inner / 2, bottom + 36,
+                   html_escaped(plot.x_label));
 }
 
 }  // namespace
