@@ -77,6 +77,8 @@ const SketchPoint& drawn_point(const SketchedJoint& joint) {
 struct DrawnSketch {
   const DrawnState& state;
   Sketch sketch;
+
+  Point3 at(const SketchPoint& p) const { return placed(state.row, p); }
 };
 
 // Returns nullopt if a position in the drawing or its width [m] overflows.
@@ -84,17 +86,15 @@ std::optional<View> view_of(std::array<int, 2> plane, const std::vector<DrawnSke
   Eigen::AlignedBox2d box;
   View view{plane};
   bool finite = true;
-  const auto extend = [&](const DrawnState& state, const SketchPoint& p) {
-    const Point2 at = view.flat(placed(state.row, p));
-    box.extend(at);
-    finite = finite && at.allFinite();
+  const auto extend = [&](const Point3& p) {
+    box.extend(view.flat(p));
+    finite = finite && view.flat(p).allFinite();
   };
-  for (const auto& [state, sketch] : drawn) {
-    for (std::size_t i = 0; i < sketch.bodies.size(); ++i)
-      for (const Point3& s : sketch.bodies[i]) extend(state, {i, s});
-    for (const SketchedJoint& joint : sketch.joints) extend(state, drawn_point(joint));
-    for (const SketchedSpring& spring : sketch.springs)
-      for (const SketchPoint& end : {spring.from, spring.to}) extend(state, end);
+  for (const DrawnSketch& one : drawn) {
+    for (std::size_t i = 0; i < one.sketch.bodies.size(); ++i)
+      for (const Point3& s : one.sketch.bodies[i]) extend(one.at({i, s}));
+    for (const SketchedJoint& joint : one.sketch.joints) extend(one.at(drawn_point(joint)));
+    for (const SketchedSpring& spring : one.sketch.springs) extend(one.at(spring.from)), extend(one.at(spring.to));
   }
   const double width = std::max(box.sizes().x(), 1e-12), height = std::max(box.sizes().y(), 1e-12);
   view.scale = std::min((kWidth - 2 * kMargin) / width, (kLargestHeight - 2 * kMargin - kTitle) / height);
@@ -138,7 +138,7 @@ Point2 middle_of(const std::vector<Point2>& points) {
 
 std::vector<Point2> outline_of(const DrawnSketch& drawn, std::size_t body, const View& view) {
   std::vector<Point2> pixels;
-  for (const Point3& s : drawn.sketch.bodies[body]) pixels.push_back(view(placed(drawn.state.row, {body, s})));
+  for (const Point3& s : drawn.sketch.bodies[body]) pixels.push_back(view(drawn.at({body, s})));
   return outline(std::move(pixels));
 }
 
@@ -163,10 +163,9 @@ std::string name_beside(const std::vector<Point2>& hull, const Point2& other, co
 void draw_state(const DrawnSketch& drawn, const DrawnSketch& first, const View& view, bool last, std::string& svg) {
   const auto& [state, sketch] = drawn;
   svg += last ? "<g>\n" : "<g class=\"earlier\">\n";
-  for (const SketchedSpring& spring : sketch.springs) {
+  for (const SketchedSpring& spring : sketch.springs)
     svg += fmt::format("<path class=\"spring\" d=\"{}\"/>\n",
-                       coil(view(placed(state.row, spring.from)), view(placed(state.row, spring.to))));
-  }
+                       coil(view(drawn.at(spring.from)), view(drawn.at(spring.to))));
   for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
     const std::vector<Point2> hull = outline_of(drawn, i, view);
     svg += fmt::format("<path class=\"body c{0} f{0}\" d=\"{1}\"/>\n", i % kBodyColours,
@@ -175,9 +174,8 @@ void draw_state(const DrawnSketch& drawn, const DrawnSketch& first, const View& 
       svg += name_beside(hull, middle_of(outline_of(first, i, view)), state.scene.bodies[i].name);
   }
   for (const SketchedJoint& joint : sketch.joints) {
-    const SketchPoint at = drawn_point(joint);
-    const Point2 p = view(placed(state.row, at));
-    if (at.body == kGround)
+    const Point2 p = view(drawn.at(drawn_point(joint)));
+    if (drawn_point(joint).body == kGround)
       svg += fmt::format("<path class=\"ground\" d=\"M{0:.1f} {1:.1f}l-7 12h14Z\"/>\n", p.x(), p.y());
     svg += fmt::format("<circle class=\"joint\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\"/>\n", p.x(), p.y());
   }
@@ -231,20 +229,19 @@ std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane
   if (!found) return {};
   const View& view = *found;
   const std::string full_title = fmt::format("{}, seen in the {}-{} plane", title, "xyz"[plane[0]], "xyz"[plane[1]]);
-  std::string svg = fmt::format("<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, view.height,
-                                html_escaped(full_title));
-  svg += fmt::format("<text class=\"title\" x=\"{}\" y=\"18\">{}</text>\n", kMargin / 2, html_escaped(full_title));
+  std::string svg = fmt::format(
+      "<svg viewBox=\"0 0 {0} {1:.0f}\" role=\"img\" aria-label=\"{2}\">\n<text class=\"title\" x=\"{3}\" "
+      "y=\"18\">{2}</text>\n",
+      kWidth, view.height, html_escaped(full_title), kMargin / 2);
   for (const DrawnSketch& one : drawn) draw_state(one, drawn.front(), view, &one == &drawn.back(), svg);
   draw_scale(view, svg);
   svg += "</svg>\n";
   if (states.size() < 2) return svg;
   svg += "<div class=\"legend\">";
-  for (const DrawnState& state : states) {
-    const bool last = &state == &states.back();
+  for (const DrawnState& state : states)
     svg += fmt::format(
         "<span><svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"line{} c0\" d=\"M0 5H30\"/></svg>{}</span>",
-        last ? "" : " dashed", html_escaped(state.name));
-  }
+        &state == &states.back() ? "" : " dashed", html_escaped(state.name));
   return svg + "</div>\n";
 }
 

@@ -46,29 +46,33 @@ class SketchMaker {
     return point_by_facts(facts_, body, field);
   }
 
+  // Makes it a point of its body, too.
+  SketchPoint add(const std::string& body, const PointField& field) {
+    const SketchPoint p = point(body, field);
+    if (p.body != kGround) result_.bodies[p.body].push_back(p.s);
+    return p;
+  }
+
   void add_joint(const Joint& joint) {
-    const SketchPoint p1 = point(joint.body1, joint.point1), p2 = point(joint.body2, joint.point2);
-    add(p1), add(p2);
+    const SketchPoint p1 = add(joint.body1, joint.point1), p2 = add(joint.body2, joint.point2);
     std::optional<Vector3d> axis;
     if (joint.axis1) axis = point(joint.body1, *joint.axis1).s;
     if (!ties_joints(joint)) result_.joints.push_back({joint.type, p1, p2, axis});
   }
 
   void add_spring(const Tsda& tsda) {
-    const SketchPoint p1 = point(tsda.body1, tsda.point1), p2 = point(tsda.body2, tsda.point2);
-    add(p1), add(p2);
+    const SketchPoint p1 = add(tsda.body1, tsda.point1), p2 = add(tsda.body2, tsda.point2);
     const auto acts = [&](const Field& coefficient) { return facts_.value(coefficient).value_or(1) != 0; };
     result_.springs.push_back({p1, p2, tsda.law || acts(tsda.stiffness), acts(tsda.damping)});
   }
 
   void add_points_of(const Sensor& sensor) {
-    if (!sensor.body.empty()) add(point(sensor.body, sensor.point));
+    if (!sensor.body.empty()) add(sensor.body, sensor.point);
     if (!sensor.body1.empty() && !sensor.body2.empty())
-      add(point(sensor.body1, sensor.point1)), add(point(sensor.body2, sensor.point2));
+      add(sensor.body1, sensor.point1), add(sensor.body2, sensor.point2);
     if (sensor.quantity != "position") return;
     const SketchPoint p = point(sensor.body, sensor.point);
-    const auto same = [&](const TracedPoint& t) { return t.point.body == p.body && t.point.s == p.s; };
-    if (p.body == kGround || std::ranges::any_of(result_.traces, same)) return;
+    if (p.body == kGround || std::ranges::count(result_.traces, p, &TracedPoint::point) > 0) return;
     const std::string* const name = std::get_if<std::string>(&sensor.point);
     result_.traces.push_back({name ? sensor.body + "." + *name : sensor.name, p});
   }
@@ -77,17 +81,12 @@ class SketchMaker {
   void add_own_points(std::size_t index) {
     const Body& body = scene_.bodies[index];
     for (const auto& [name, coordinates] : body.points)
-      if (!directions_.contains(name)) add(point(body.name, coordinates));
+      if (!directions_.contains(name)) add(body.name, coordinates);
     for (const Shape& shape : body.shapes) {
-      const SketchPoint from = point(body.name, shape.from), to = point(body.name, shape.to);
-      add(from), add(to);
+      const SketchPoint from = add(body.name, shape.from), to = add(body.name, shape.to);
       result_.shapes.push_back({index, shape.type, from.s, to.s, shape.radius});
     }
-    if (result_.bodies[index].size() < 2) add(point(body.name, body.com));
-  }
-
-  void add(const SketchPoint& p) {
-    if (p.body != kGround) result_.bodies[p.body].push_back(p.s);
+    if (result_.bodies[index].size() < 2) add(body.name, body.com);
   }
 
   const Scene& scene_;

@@ -17,6 +17,7 @@ inline constexpr std::size_t kGround = static_cast<std::size_t>(-1);
 struct SketchPoint {
   std::size_t body;  // its number, or kGround
   Eigen::Vector3d s;
+  bool operator==(const SketchPoint&) const = default;
 };
 
 struct SketchedJoint {

@@ -12,13 +12,6 @@ namespace {
 
 constexpr std::size_t kMostSeries = 6;  // in one plot
 
-std::vector<double> column(const Trajectory& trajectory, std::size_t index) {
-  std::vector<double> values;
-  values.reserve(trajectory.rows.size());
-  for (const auto& row : trajectory.rows) values.push_back(row[index]);
-  return values;
-}
-
 // The content of one plot: its label, and the trajectory's columns.
 using SensorGroup = std::pair<std::string, std::vector<std::size_t>>;
 
@@ -53,31 +46,31 @@ std::vector<SensorGroup> position_groups(const Scene& scene, const Trajectory& t
   return groups;
 }
 
-void add_series(LinePlot& plot, const SensorGroup& group, const Trajectory& trajectory, const std::string& suffix,
-                Mark mark) {
-  if (trajectory.rows.empty()) return;  // the run failed before its first row, or was interrupted
-  for (const std::size_t index : group.second) {
-    plot.series.push_back({trajectory.columns[index] + suffix, column(trajectory, 0), column(trajectory, index), mark});
-  }
-}
-
-std::vector<SensorGroup> groups_of(const Scene& scene, const Trajectory& trajectory) {
-  if (trajectory.rows.empty()) return {};
-  return scene.sensors.empty() ? position_groups(scene, trajectory) : sensor_groups(scene);
-}
-
-std::string title_of(const SensorGroup& group, const Trajectory& trajectory) {
-  return group.second.size() == 1 ? trajectory.columns[group.second.front()] : group.first;
-}
-
 }  // namespace
+
+std::vector<double> column(const Trajectory& table, std::size_t index) {
+  std::vector<double> values;
+  values.reserve(table.rows.size());
+  for (const auto& row : table.rows) values.push_back(row[index]);
+  return values;
+}
+
+std::optional<PlotSeries> series_of(const Trajectory& table, const std::string& name, Mark mark) {
+  const auto found = std::ranges::find(table.columns, name);
+  if (found == table.columns.end() || table.rows.empty()) return std::nullopt;
+  return PlotSeries{name, column(table, 0), column(table, static_cast<std::size_t>(found - table.columns.begin())),
+                    mark};
+}
 
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& trajectory) {
   std::vector<LinePlot> plots;
-  for (const SensorGroup& group : groups_of(scene, trajectory)) {
-    LinePlot plot{.title = title_of(group, trajectory), .x_label = "t [s]", .y_label = group.first};
-    add_series(plot, group, trajectory, "", Mark::line);
-    plots.push_back(std::move(plot));
+  if (trajectory.rows.empty()) return plots;  // the run failed before its first row, or was interrupted
+  for (const auto& [label, indices] :
+       scene.sensors.empty() ? position_groups(scene, trajectory) : sensor_groups(scene)) {
+    LinePlot& plot = plots.emplace_back(LinePlot{.title = label, .x_label = "t [s]", .y_label = label});
+    if (indices.size() == 1) plot.title = trajectory.columns[indices.front()];
+    for (const std::size_t index : indices)
+      plot.series.push_back({trajectory.columns[index], column(trajectory, 0), column(trajectory, index)});
   }
   return plots;
 }
@@ -85,15 +78,14 @@ std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& traject
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after,
                                    const SensorLimits& limits) {
   std::vector<LinePlot> plots;
-  for (const SensorGroup& group : groups_of(scene, before)) {
-    for (const std::size_t index : group.second) {
-      const SensorGroup alone{group.first, {index}};
-      LinePlot plot{.title = before.columns[index], .x_label = "t [s]", .y_label = group.first};
-      add_series(plot, alone, before, ", before", Mark::dashed);
-      add_series(plot, alone, after, ", after", Mark::line);
+  for (const LinePlot& group : motion_plots(scene, before)) {
+    for (const PlotSeries& series : group.series) {
+      LinePlot& plot = plots.emplace_back(LinePlot{.title = series.name, .x_label = "t [s]", .y_label = group.y_label});
+      plot.series.push_back({series.name + ", before", series.x, series.y, Mark::dashed});
+      if (const auto designed = series_of(after, series.name))
+        plot.series.push_back({series.name + ", after", designed->x, designed->y});
       for (const auto& [sensor, limit] : limits)
-        if (sensor == before.columns[index]) plot.limits.push_back(limit);
-      plots.push_back(std::move(plot));
+        if (sensor == series.name) plot.limits.push_back(limit);
     }
   }
   return plots;

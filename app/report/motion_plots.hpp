@@ -1,6 +1,7 @@
 // A trajectory as plots over time: sensors grouped by unit. A scene without sensors shows the bodies' positions.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +10,10 @@
 #include "app/results/trajectory_csv.hpp"
 
 namespace mbsopt {
+
+std::vector<double> column(const Trajectory& table, std::size_t index);
+// A column over the first one; nothing without that column or without rows.
+std::optional<PlotSeries> series_of(const Trajectory& table, const std::string& name, Mark mark = Mark::line);
 
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& trajectory);
 // Limits of sensors over the whole run, by the names of the sensors.

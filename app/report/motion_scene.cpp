@@ -8,6 +8,7 @@
 
 #include "app/report/html_text.hpp"
 #include "app/report/mechanism_sketch.hpp"
+#include "app/report/motion_plots.hpp"
 #include "core/scene/scene_facts.hpp"
 
 namespace mbsopt {
@@ -19,19 +20,18 @@ constexpr std::size_t kPose = 7;              // x y z e0 e1 e2 e3
 
 std::string vector_of(const Eigen::Vector3d& v) { return fmt::format("[{:.6g},{:.6g},{:.6g}]", v.x(), v.y(), v.z()); }
 
-long number_of(const SketchPoint& p) { return p.body == kGround ? -1 : static_cast<long>(p.body); }
-
-std::string ends_of(const SketchPoint& p1, const SketchPoint& p2) {
-  return fmt::format(R"("b1":{},"p1":{},"b2":{},"p2":{})", number_of(p1), vector_of(p1.s), number_of(p2),
-                     vector_of(p2.s));
+// "b": the body's number, -1 for the ground; "p": the point in its frame. end: "", or "1" and "2".
+std::string point_json(const SketchPoint& p, const char* end = "") {
+  return fmt::format(R"("b{0}":{1},"p{0}":{2})", end, p.body == kGround ? -1 : static_cast<long>(p.body),
+                     vector_of(p.s));
 }
 
 // Keeps one of several rows, and the last.
-std::vector<std::size_t> kept_rows(std::size_t rows, std::size_t most) {
-  std::vector<std::size_t> kept;
-  const std::size_t stride = (rows + most - 1) / most;
-  for (std::size_t k = 0; k < rows; k += stride) kept.push_back(k);
-  if (kept.back() + 1 != rows) kept.push_back(rows - 1);
+Trajectory thinned(const Trajectory& all, std::size_t most) {
+  Trajectory kept{all.columns, {}};
+  const std::size_t stride = (all.rows.size() + most - 1) / most;
+  for (std::size_t k = 0; k < all.rows.size(); k += stride) kept.rows.push_back(all.rows[k]);
+  if ((all.rows.size() - 1) % stride != 0) kept.rows.push_back(all.rows.back());
   return kept;
 }
 
@@ -51,16 +51,13 @@ bool poses_are_finite(const MovingState& state) {
 }
 
 std::string targets_json(PageArrays& arrays, const std::vector<PointTarget>& targets) {
-  std::vector<std::string> all;
-  for (const PointTarget& target : targets) {
-    std::vector<std::string> place;
-    for (const std::vector<double>& x : target.place)
-      place.push_back(x.empty() ? "null" : std::to_string(arrays.add(x)));
-    all.push_back(fmt::format(R"({{"measured":{},"b":{},"p":{},"t":{},"place":[{}]}})", target.measured,
-                              number_of(target.point), vector_of(target.point.s), arrays.add(target.t, 9),
-                              fmt::join(place, ",")));
-  }
-  return fmt::format("[{}]", fmt::join(all, ","));
+  return json_list(targets, [&](const PointTarget& target) {
+    const std::string place = json_list(target.place, [&](const std::vector<double>& x) {
+      return x.empty() ? std::string("null") : std::to_string(arrays.add(x));
+    });
+    return fmt::format(R"({{"measured":{},{},"t":{},"place":{}}})", target.measured, point_json(target.point),
+                       arrays.add(target.t, 9), place);
+  });
 }
 
 // The size that 98 % of the forces do not exceed; the others, as at singular positions, would hide them. It is 0
@@ -82,34 +79,23 @@ std::string reactions_json(PageArrays& arrays, const MovingState& state) {
   const Trajectory& forces = state.forces;
   const double large = large_force(forces);
   if (large == 0) return "null";
-  const auto column = [&](std::size_t index) {
-    std::vector<double> values;
-    for (const std::vector<double>& row : forces.rows) values.push_back(row[index]);
-    return values;
-  };
   std::vector<std::string> joints;
   for (std::size_t k = 1; k + 2 < forces.columns.size(); k += 3) {
     const std::string name = forces.columns[k].substr(0, forces.columns[k].size() - 2);  // "A.x"
     const auto joint = std::ranges::find(state.scene.joints, name, &Joint::name);
     if (joint == state.scene.joints.end()) continue;
-    const SketchPoint on = point_of(state.scene, joint->body2, joint->point2);
-    joints.push_back(fmt::format(R"({{"b":{},"p":{},"force":[{},{},{}]}})", number_of(on), vector_of(on.s),
-                                 arrays.add(column(k)), arrays.add(column(k + 1)), arrays.add(column(k + 2))));
+    joints.push_back(fmt::format(
+        R"({{{},"force":[{},{},{}]}})", point_json(point_of(state.scene, joint->body2, joint->point2)),
+        arrays.add(column(forces, k)), arrays.add(column(forces, k + 1)), arrays.add(column(forces, k + 2))));
   }
-  return fmt::format(R"({{"t":{},"large":{:.6g},"joints":[{}]}})", arrays.add(column(0), 9), large,
+  return fmt::format(R"({{"t":{},"large":{:.6g},"joints":[{}]}})", arrays.add(column(forces, 0), 9), large,
                      fmt::join(joints, ","));
 }
 
 std::string state_json(PageArrays& arrays, const MovingState& state, std::size_t most) {
   const Sketch sketch = sketch_of(state.scene);
-  const auto& rows = state.trajectory.rows;
-  const std::vector<std::size_t> kept = kept_rows(rows.size(), most);
-  const auto column = [&](std::size_t index) {
-    std::vector<double> values;
-    for (const std::size_t k : kept) values.push_back(rows[k][index]);
-    return values;
-  };
-  std::vector<std::string> bodies, joints, springs, traces;
+  const Trajectory shown = thinned(state.trajectory, most);
+  std::vector<std::string> bodies;
   for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
     std::vector<std::string> points, shapes, row;
     for (const Eigen::Vector3d& s : sketch.bodies[i]) points.push_back(vector_of(s));
@@ -119,27 +105,27 @@ std::string state_json(PageArrays& arrays, const MovingState& state, std::size_t
                                      vector_of(shape.from), vector_of(shape.to), shape.radius));
     std::sort(points.begin(), points.end());
     points.erase(std::unique(points.begin(), points.end()), points.end());
-    for (std::size_t k = 0; k < kPose; ++k) row.push_back(coordinate(arrays, column(1 + 13 * i + k)));
+    for (std::size_t k = 0; k < kPose; ++k) row.push_back(coordinate(arrays, column(shown, 1 + 13 * i + k)));
     bodies.push_back(fmt::format(R"({{"name":{},"points":[{}],"shapes":[{}],"row":[{}]}})",
                                  json_quoted(state.scene.bodies[i].name), fmt::join(points, ","),
                                  fmt::join(shapes, ","), fmt::join(row, ",")));
   }
-  for (const SketchedJoint& joint : sketch.joints)
-    joints.push_back(fmt::format(R"({{"type":{},{},"axis":{}}})", json_quoted(joint.type),
-                                 ends_of(joint.on_body1, joint.on_body2),
-                                 joint.axis ? vector_of(*joint.axis) : "null"));
-  for (const SketchedSpring& spring : sketch.springs)
-    springs.push_back(fmt::format(R"({{{},"spring":{},"damper":{}}})", ends_of(spring.from, spring.to), spring.spring,
-                                  spring.damper));
-  for (const TracedPoint& trace : sketch.traces)
-    traces.push_back(fmt::format(R"({{"name":{},"b":{},"p":{}}})", json_quoted(trace.name), number_of(trace.point),
-                                 vector_of(trace.point.s)));
+  const auto joint_json = [](const SketchedJoint& joint) {
+    return fmt::format(R"({{"type":{},{},{},"axis":{}}})", json_quoted(joint.type), point_json(joint.on_body1, "1"),
+                       point_json(joint.on_body2, "2"), joint.axis ? vector_of(*joint.axis) : "null");
+  };
+  const auto spring_json = [](const SketchedSpring& spring) {
+    return fmt::format(R"({{{},{},"spring":{},"damper":{}}})", point_json(spring.from, "1"), point_json(spring.to, "2"),
+                       spring.spring, spring.damper);
+  };
+  const auto trace_json = [](const TracedPoint& trace) {
+    return fmt::format(R"({{"name":{},{}}})", json_quoted(trace.name), point_json(trace.point));
+  };
   return fmt::format(
-      R"({{"name":{},"ghost":{},"t":{},"bodies":[{}],"joints":[{}],"springs":[{}],"traces":[{}],"targets":{},)"
-      R"("reactions":{}}})",
-      json_quoted(state.name), state.ghost, arrays.add(column(0), 9), fmt::join(bodies, ","), fmt::join(joints, ","),
-      fmt::join(springs, ","), fmt::join(traces, ","), targets_json(arrays, state.targets),
-      reactions_json(arrays, state));
+      R"({{"name":{},"ghost":{},"t":{},"bodies":[{}],"joints":{},"springs":{},"traces":{},"targets":{},"reactions":{}}})",
+      json_quoted(state.name), state.ghost, arrays.add(column(shown, 0), 9), fmt::join(bodies, ","),
+      json_list(sketch.joints, joint_json), json_list(sketch.springs, spring_json),
+      json_list(sketch.traces, trace_json), targets_json(arrays, state.targets), reactions_json(arrays, state));
 }
 
 // Returns whether all points stay in planes of that normal.

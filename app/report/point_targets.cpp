@@ -34,7 +34,7 @@ std::vector<PointTarget> point_targets(const Scene& scene, const std::vector<Sen
     const std::size_t stride = (v.t.size() + kMostTimes - 1) / kMostTimes;
     const std::vector<double> t = every(v.t, stride);
     auto target = std::ranges::find_if(targets, [&](const PointTarget& other) {
-      return other.point.body == point.body && other.point.s == point.s && other.t == t && other.place[axis].empty();
+      return other.point == point && other.t == t && other.place[axis].empty();
     });
     if (target == targets.end()) target = targets.insert(targets.end(), {point, measured, t});
     target->place[axis] = every(v.value, stride);
