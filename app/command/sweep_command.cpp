@@ -4,7 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "app/report/sweep_report.hpp"
+#include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/trajectory_csv.hpp"

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "app/report/tradeoff_report.hpp"
+#include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/recommended_problem.hpp"

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <tuple>
+#include <optional>
 #include <utility>
 
 #include "app/report/mechanism_drawing.hpp"
@@ -66,12 +65,9 @@ void add_parameters(HtmlPage& page, const Scene& scene, const Json& result) {
 }
 
 // The distance of a value from the nearer of its limits; negative beyond it.
-TableCell margin_of(const Json& objective, const Json& value) {
-  const Json lower = objective.value("lower", Json()), upper = objective.value("upper", Json());
-  double margin = std::numeric_limits<double>::infinity();
-  if (!value.is_number()) return "-";
-  if (lower.is_number()) margin = std::min(margin, value.get<double>() - lower.get<double>());
-  if (upper.is_number()) margin = std::min(margin, upper.get<double>() - value.get<double>());
+TableCell margin_of(const Json& objective, const char* value) {
+  const double x = number_of(objective, value),
+               margin = std::fmin(x - number_of(objective, "lower"), number_of(objective, "upper") - x);
   return std::isfinite(margin) ? number_cell(margin, 3) : "-";
 }
 
@@ -88,7 +84,7 @@ void add_outcome(HtmlPage& page, const Json& result) {
                     number_cell(objective.at("value"), 7)});
     if (true_values) rows.back().push_back(number_cell(extreme, 7));
     for (const char* key : {"lower", "upper"}) rows.back().push_back(number_cell(objective.value(key, Json()), 7));
-    rows.back().push_back(margin_of(objective, extreme.is_number() ? extreme : objective.at("value")));
+    rows.back().push_back(margin_of(objective, extreme.is_number() ? "true_value" : "value"));
     rows.back().push_back(number_cell(objective.value("price", Json()), 7));
   };
   for (const auto& [name, objective] : result.at("objectives").items()) add_row(name, objective);
@@ -119,12 +115,12 @@ void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho
     return;
   }
   const Scene designed = with_values(scene, rho);
-  const std::string start = mechanism_drawing(
-      "At the start", plane, {{"before", scene, before.rows.front()}, {"after", designed, after.rows.front()}});
-  const std::string end = mechanism_drawing(
-      "At the end", plane, {{"before", scene, before.rows.back()}, {"after", designed, after.rows.back()}});
+  const auto still = [&](const char* title, const std::vector<double>& first, const std::vector<double>& second) {
+    return mechanism_drawing(title, plane, {{"before", scene, first}, {"after", designed, second}});
+  };
   add_motion(page, plane, {{"before", scene, before, true}, {"after", designed, after, false, targets, later.forces}},
-             start + end);
+             still("At the start", before.rows.front(), after.rows.front()) +
+                 still("At the end", before.rows.back(), after.rows.back()));
 }
 
 void add_running_terms(HtmlPage& page, const DesignMotion& before, const DesignMotion& after,
@@ -132,14 +128,12 @@ void add_running_terms(HtmlPage& page, const DesignMotion& before, const DesignM
   std::vector<LinePlot> plots;
   for (const RunningTerm& term : terms) {
     LinePlot plot{.title = term.title, .x_label = "t [s]", .y_label = term.y_label, .limits = term.limits};
-    for (const auto& [name, running, mark] :
-         {std::tuple("before", &before.running, Mark::dashed), std::tuple("after", &after.running, Mark::line)}) {
-      const auto found = std::ranges::find(running->columns, term.objective);
-      const auto column = static_cast<std::size_t>(found - running->columns.begin());
-      if (found == running->columns.end() || running->rows.empty()) continue;
-      PlotSeries& series = plot.series.emplace_back(PlotSeries{name, {}, {}, mark});
-      for (const std::vector<double>& row : running->rows)
-        series.x.push_back(row.front()), series.y.push_back(row[column]);
+    for (const DesignMotion* motion : {&before, &after}) {
+      std::optional<PlotSeries> series =
+          series_of(motion->running, term.objective, motion == &before ? Mark::dashed : Mark::line);
+      if (!series) continue;
+      series->name = motion == &before ? "before" : "after";
+      plot.series.push_back(*std::move(series));
     }
     if (std::ranges::any_of(plot.series, [](const PlotSeries& s) { return std::isfinite(s.y.front()); }))
       plots.push_back(std::move(plot));
@@ -168,9 +162,7 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
   add_drawings(page, scene, rho, before, after, targets);
   for (const LinePlot& plot : motion_plots(scene, before.trajectory, after.trajectory, limits)) page.plot(plot);
   add_running_terms(page, before, after, terms);
-  add_model(page, result);
-  add_provenance(page, result);
-  return page.text();
+  return finished(page, result);
 }
 
 }  // namespace mbsopt

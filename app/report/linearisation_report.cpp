@@ -52,6 +52,12 @@ void add_responses(HtmlPage& page, const Scene& scene, const Json& result, const
       "Static: the change of the output by a constant input of 1. Below: the amplitude of the output when the input "
       "swings with amplitude 1.");
   const Eigen::MatrixXcd still = transfer(x, 0);
+  std::vector<double> frequencies;
+  std::vector<Eigen::MatrixXcd> swinging;
+  for (int k = 0; k <= kFrequencies && fastest > 0; ++k) {
+    frequencies.push_back(0.1 * slowest * std::pow(100 * fastest / slowest, static_cast<double>(k) / kFrequencies));
+    swinging.push_back(transfer(x, {0, 2 * std::numbers::pi * frequencies.back()}));
+  }
   std::vector<TableRow> rows;
   std::vector<LinePlot> plots;
   for (std::size_t j = 0; j < inputs.size(); ++j) {
@@ -62,31 +68,18 @@ void add_responses(HtmlPage& page, const Scene& scene, const Json& result, const
       const std::string unit = per(unit_in(scene, *sensor), parameter->unit);
       const double gain = still(row, column).real();
       rows.push_back({inputs[j], outputs[i], std::isfinite(gain) ? number_cell(gain, 6) : TableCell("-"), unit});
-      if (plots.size() == kDrawn || !(fastest > 0)) continue;
-      LinePlot plot{.title = fmt::format("{} by {}", outputs[i], inputs[j]),
-                    .x_label = "frequency [Hz]",
-                    .y_label = fmt::format("amplitude [{}]", unit),
-                    .logarithmic_y = true,
-                    .logarithmic_x = true};
-      plot.series.push_back({outputs[i], {}, {}});
-      plots.push_back(std::move(plot));
+      std::vector<double> amplitudes;
+      for (const Eigen::MatrixXcd& G : swinging) amplitudes.push_back(std::abs(G(row, column)));
+      if (rows.size() <= kDrawn && std::ranges::any_of(amplitudes, [](double y) { return y > 0; }))
+        plots.push_back({.title = fmt::format("{} by {}", outputs[i], inputs[j]),
+                         .x_label = "frequency [Hz]",
+                         .y_label = fmt::format("amplitude [{}]", unit),
+                         .series = {{outputs[i], frequencies, amplitudes}},
+                         .logarithmic_y = true,
+                         .logarithmic_x = true});
     }
   }
   page.table({"input", "output", "static", "unit"}, rows);
-  for (int k = 0; k <= kFrequencies && !plots.empty(); ++k) {
-    const double f = 0.1 * slowest * std::pow(100 * fastest / slowest, static_cast<double>(k) / kFrequencies);
-    const Eigen::MatrixXcd G = transfer(x, {0, 2 * std::numbers::pi * f});
-    for (std::size_t p = 0; p < plots.size(); ++p) {
-      PlotSeries& series = plots[p].series.front();
-      series.x.push_back(f);
-      series.y.push_back(
-          std::abs(G(static_cast<Eigen::Index>(p % outputs.size()), static_cast<Eigen::Index>(p / outputs.size()))));
-    }
-  }
-  const auto is_zero = [](const LinePlot& plot) {
-    return std::ranges::none_of(plot.series.front().y, [](double y) { return y > 0; });
-  };
-  std::erase_if(plots, is_zero);
   for (const LinePlot& plot : plots) page.plot(plot);
   if (rows.size() > kDrawn) page.note(fmt::format("The first {} of {} responses are drawn.", kDrawn, rows.size()));
 }
@@ -115,9 +108,7 @@ std::string linearisation_report(const Scene& scene, const Json& result, const L
   }
   if (shapes.size() > kDrawn) page.paragraph(fmt::format("The first {} of {} modes are drawn.", kDrawn, shapes.size()));
   add_responses(page, scene, result.at("linearisation"), x);
-  add_model(page, result);
-  add_provenance(page, result);
-  return page.text();
+  return finished(page, result);
 }
 
 }  // namespace mbsopt

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "app/report/line_plot.hpp"
+#include "app/report/motion_plots.hpp"
 #include "app/results/sensor_unit.hpp"
 #include "app/run/energy_balance.hpp"
 #include "app/terminal/text_table.hpp"
@@ -32,6 +33,10 @@ void add_entries(HtmlPage& page, const Json& object, std::initializer_list<Entry
     if (object.contains(entry.key)) rows.push_back({entry.label, number_cell(object.at(entry.key), entry.digits)});
   }
   page.table({"", ""}, rows);
+}
+
+bool all_positive(const std::vector<double>& values) {
+  return std::ranges::all_of(values, [](double v) { return v > 0; });
 }
 
 }  // namespace
@@ -69,6 +74,13 @@ std::string after_number(const Json& quantity) {
   return unit.empty() || unit == "-" ? "" : " " + unit;
 }
 
+std::vector<std::string> objective_values(const Json& objectives) {
+  std::vector<std::string> values;
+  for (const auto& [name, objective] : objectives.items())
+    values.push_back(fmt::format("{} = {}{}", name, cell(objective.at("value"), 5), after_number(objective)));
+  return values;
+}
+
 std::string unit_per(const std::string& unit, const std::string& divisor) {
   const auto dimension_of = [](const std::string& text) {
     return text == "-" ? std::optional(Unit{}) : parse_unit(text);
@@ -97,17 +109,6 @@ void add_status(HtmlPage& page, const Json& result) {
   for (const Json& warning : result.at("warnings")) page.warning(warning.get<std::string>());
 }
 
-void add_model(HtmlPage& page, const Json& result) {
-  if (!result.contains("model")) return;
-  page.heading("Mechanism");
-  add_entries(page, result.at("model"),
-              {{"bodies", "bodies"},
-               {"equations", "constraint equations"},
-               {"rank", "of rank"},
-               {"degrees_of_freedom", "degrees of freedom"},
-               {"redundant", "redundant"}});
-}
-
 void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
   if (!result.contains("simulation")) return;
   page.heading("Simulation");
@@ -124,6 +125,11 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
                 conserves_energy(scene) ? "largest change of energy [J]"
                                         : fmt::format("largest change of energy [J], {}", kWorkIsDone),
                 2}});
+}
+
+double number_of(const Json& object, const std::string& key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : NAN;
 }
 
 bool has_true_values(const Json& result) {
@@ -155,36 +161,25 @@ double Between::operator()(double value) const {
 }
 
 std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p) {
-  const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
-  if (!lower.is_number() || !upper.is_number()) return std::nullopt;
-  const double l = lower.get<double>(), u = upper.get<double>();
-  if (!(u > l) || !std::isfinite(u - l)) return std::nullopt;
+  const double lower = number_of(p, "lower"), upper = number_of(p, "upper");
+  if (!(upper > lower) || !std::isfinite(upper - lower)) return std::nullopt;
   const auto parameter = std::ranges::find(scene.parameters, name.substr(name.rfind('.') + 1), &Parameter::name);
-  return Between{l, u, parameter != scene.parameters.end() && parameter->scale != ParameterScale::linear};
+  return Between{lower, upper, parameter != scene.parameters.end() && parameter->scale != ParameterScale::linear};
 }
 
 void add_convergence(HtmlPage& page, const Scene& scene, const Trajectory& history, const Json& parameters,
                      const std::string& unit) {
   if (history.rows.size() < 2) return;
   page.heading("Convergence");
-  const auto column = [&](std::size_t index) {
-    std::vector<double> values;
-    for (const auto& row : history.rows) values.push_back(row[index]);
-    return values;
-  };
   for (const char* name : {"objective", "cost", "infeasibility"}) {
-    const auto found = std::find(history.columns.begin(), history.columns.end(), name);
-    if (found == history.columns.end()) continue;
-    const std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
-    const bool positive = std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
-    if (std::all_of(values.begin(), values.end(), [](double v) { return v == 0; })) continue;
-    LinePlot plot{.title = name,
-                  .x_label = "iteration",
-                  .y_label = fmt::format("{} [{}]", name, name == std::string("objective") ? unit : "-"),
-                  .logarithmic_y = positive,
-                  .whole_x = true};
-    plot.series.push_back({name, column(0), values, Mark::line});
-    page.plot(plot);
+    const std::optional<PlotSeries> series = series_of(history, name);
+    if (!series || std::ranges::all_of(series->y, [](double v) { return v == 0; })) continue;
+    page.plot({.title = name,
+               .x_label = "iteration",
+               .y_label = fmt::format("{} [{}]", name, name == std::string("objective") ? unit : "-"),
+               .series = {*series},
+               .logarithmic_y = all_positive(series->y),
+               .whole_x = true});
   }
   // Shows values between two bounds, else relative to the start.
   LinePlot bounded{.title = "Parameters between their bounds",
@@ -194,14 +189,13 @@ void add_convergence(HtmlPage& page, const Scene& scene, const Trajectory& histo
                    .limits = {{"lower bound", 0, false}, {"upper bound", 1, true}}};
   LinePlot free{.title = "Parameters", .x_label = "iteration", .y_label = "value/initial value [-]", .whole_x = true};
   for (const auto& [name, p] : parameters.items()) {
-    const auto found = std::find(history.columns.begin(), history.columns.end(), name);
-    if (found == history.columns.end()) continue;
-    std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
+    std::optional<PlotSeries> series = series_of(history, name);
+    if (!series) continue;
     const std::optional<Between> between = bounds_of(scene, name, p);
     const double initial = p.at("initial").get<double>();
     if (!between && initial == 0) continue;
-    for (double& value : values) value = between ? (*between)(value) : value / initial;
-    (between ? bounded : free).series.push_back({name, column(0), values, Mark::line});
+    for (double& value : series->y) value = between ? (*between)(value) : value / initial;
+    (between ? bounded : free).series.push_back(*std::move(series));
   }
   for (const LinePlot& plot : {bounded, free})
     if (!plot.series.empty() && plot.series.size() <= kMostCurves) page.plot(plot);
@@ -227,9 +221,8 @@ LinePlot parallel_coordinates(const Scene& scene, const Json& multistart, const 
     if (!is_best && first_other) series.part_of = first_other;
     if (!is_best && !first_other) first_other = plot.series.size();
     for (std::size_t k = 0; k < bounds.size(); ++k) {
-      const Json value = record.at("parameters").value(plot.x_names[k], Json());
       series.x.push_back(static_cast<double>(k));
-      series.y.push_back(value.is_number() ? bounds[k](value.get<double>()) : NAN);
+      series.y.push_back(bounds[k](number_of(record.at("parameters"), plot.x_names[k])));
     }
     plot.series.push_back(std::move(series));
   }
@@ -282,8 +275,7 @@ void add_multistart(HtmlPage& page, const Scene& scene, const Json& result) {
                     number_cell(record.value("infeasibility", Json()), 2),
                     number_cell(record.value("optimality", Json()), 2), cell(record.at("message"))});
   }
-  plot.logarithmic_y =
-      !series.y.empty() && std::all_of(series.y.begin(), series.y.end(), [](double y) { return y > 0; });
+  plot.logarithmic_y = all_positive(series.y);
   if (!series.y.empty()) page.plot(plot);
   const LinePlot ends = parallel_coordinates(scene, multistart, result.value("parameters", Json::object()));
   if (ends.series.size() > 1 && ends.x_names.size() > 1) page.plot(ends);
@@ -311,6 +303,20 @@ void add_provenance(HtmlPage& page, const Json& result) {
                              {"mbsopt", cell(result.at("version"))}};
   for (const auto& [name, version] : origin.at("libraries").items()) rows.push_back({name, cell(version)});
   page.table({"", ""}, rows);
+}
+
+std::string finished(HtmlPage& page, const Json& result) {
+  if (result.contains("model")) {
+    page.heading("Mechanism");
+    add_entries(page, result.at("model"),
+                {{"bodies", "bodies"},
+                 {"equations", "constraint equations"},
+                 {"rank", "of rank"},
+                 {"degrees_of_freedom", "degrees of freedom"},
+                 {"redundant", "redundant"}});
+  }
+  add_provenance(page, result);
+  return page.text();
 }
 
 }  // namespace mbsopt

@@ -17,10 +17,10 @@ namespace mbsopt {
 // "m^2 s"; kUnknownUnit if the unit of an objective, an entry of result["objectives"], is unknown.
 std::string unit_of(const Json& objective);
 std::string after_number(const Json& quantity);  // " m^2 s": its "unit", where it has one and is no number
+std::vector<std::string> objective_values(const Json& objectives);          // "path = 1.23 m^2 s", ...
 std::string unit_per(const std::string& unit, const std::string& divisor);  // "N/m", "m" to "N/m^2"
 std::string report_title(const Json& result);                               // "five_bar: design"
 void add_status(HtmlPage& page, const Json& result);  // a banner where it did not end well; warnings
-void add_model(HtmlPage& page, const Json& result);   // bodies, equations, degrees of freedom
 void add_simulation(HtmlPage& page, const Scene& scene, const Json& result);  // steps, violations, energy
 void add_objectives(HtmlPage& page, const Json& result);                      // name and value
 // Returns whether any objective is a smooth maximum or minimum, with the true one beside it.
@@ -51,10 +51,13 @@ inline constexpr const char* kBetween = "place between the bounds, on the scale 
 void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
                 const std::string& stills);
 void add_provenance(HtmlPage& page, const Json& result);
+// Adds bodies, equations, degrees of freedom where the result has them, and the provenance. Returns the whole page.
+std::string finished(HtmlPage& page, const Json& result);
 // A rounded number that shows all its digits under the pointer, or a word.
 TableCell number_cell(const Json& value, int digits = 6);
 // A value with the digits that its standard error justifies: 20.13 for 20.1273 +- 0.05.
 TableCell rounded_cell(const Json& value, const Json& error);
+double number_of(const Json& object, const std::string& key);  // NaN if it is none
 // A number, a word, an interval, or "-" for none.
 std::string cell(const Json& value, int digits = 7);
 

@@ -1,5 +1,6 @@
 // report.html per command: its input, its numbers, its plots. It has no time of day and no seconds of computing, so the
-// same inputs give the same bytes. The numbers come from the parts of result.json.
+// same inputs give the same bytes; only that of `tradeoff` shows seconds, because it measures them. The numbers come
+// from the parts of result.json.
 #pragma once
 
 #include <string>
@@ -8,10 +9,15 @@
 #include "app/files/result_json.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/motion_scene.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "core/start/linearisation.hpp"
 
 namespace mbsopt {
+
+struct SweepPoints;
+struct Tradeoff;
+struct PenaltyStudy;
 
 // The parts of a motion in a report beside its trajectory; each may be empty.
 struct MotionParts {
@@ -60,5 +66,15 @@ struct FitPlot {
 // motion is that of the first fitted experiment.
 std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,
                                   const std::vector<FitPlot>& fits, const std::vector<MovingState>& motion = {});
+
+// The points with the least and largest value of each objective, the best points, and each objective over each varied
+// parameter. table has the columns of sweep.csv: the number of the point, its varied parameters, its objectives. A
+// missing value is NaN.
+std::string sweep_report(const Problem& problem, const SweepPoints& points, const Json& result,
+                         const Trajectory& table);
+
+// Work-precision plots, recommendations, the accuracy of the reference.
+std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff, const ObjectiveUnits& units);
+std::string penalty_report(const Json& result, const PenaltyStudy& study);
 
 }  // namespace mbsopt

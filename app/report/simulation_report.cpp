@@ -21,10 +21,9 @@ void add_motion_verdict(HtmlPage& page, const Json& result, const Trajectory& tr
                                   counted(simulation.at("steps").get<long>(), "step"),
                                   cell(simulation.at("max_position_violation"), 2));
   constexpr std::size_t kMost = 3;  // objectives in a sentence
-  const Json objectives = result.value("objectives", Json::object());
-  if (objectives.size() <= kMost)
-    for (const auto& [name, objective] : objectives.items())
-      words += fmt::format("; {} = {}{}", name, cell(objective.at("value"), 5), after_number(objective));
+  const std::vector<std::string> values = objective_values(result.value("objectives", Json::object()));
+  if (values.size() <= kMost)
+    for (const std::string& value : values) words += "; " + value;
   page.verdict(words + ".");
 }
 
@@ -47,18 +46,14 @@ void add_extremes(HtmlPage& page, const Scene& scene, const Trajectory& trajecto
 void add_efforts(HtmlPage& page, const Scene& scene, const MotionParts& parts) {
   const Trajectory& efforts = parts.efforts;
   if (efforts.rows.empty()) return;
-  std::vector<double> t;
-  for (const auto& row : efforts.rows) t.push_back(row.front());
   for (std::size_t k = 1; k < efforts.columns.size(); ++k) {
     const auto drive = std::ranges::find(scene.drives, efforts.columns[k], &Drive::name);
     const std::string unit = drive == scene.drives.end() ? "N or N m" : unit_of_effort(*drive);
-    LinePlot plot{.title = (unit == "N" ? "Force of " : "Torque of ") + efforts.columns[k],
-                  .x_label = "t [s]",
-                  .y_label = fmt::format("{} [{}]", unit == "N" ? "force" : "torque", unit),
-                  .instants = parts.instants};
-    PlotSeries& series = plot.series.emplace_back(PlotSeries{efforts.columns[k], t, {}, Mark::line});
-    for (const auto& row : efforts.rows) series.y.push_back(row[k]);
-    page.plot(plot);
+    page.plot({.title = (unit == "N" ? "Force of " : "Torque of ") + efforts.columns[k],
+               .x_label = "t [s]",
+               .y_label = fmt::format("{} [{}]", unit == "N" ? "force" : "torque", unit),
+               .series = {{efforts.columns[k], column(efforts, 0), column(efforts, k)}},
+               .instants = parts.instants});
   }
 }
 
@@ -84,9 +79,7 @@ std::string simulation_report(const Scene& scene, const Json& result, const Traj
   add_efforts(page, scene, parts);
   add_extremes(page, scene, trajectory);
   add_simulation(page, scene, result);
-  add_model(page, result);
-  add_provenance(page, result);
-  return page.text();
+  return finished(page, result);
 }
 
 }  // namespace mbsopt

@@ -1,5 +1,3 @@
-#include "app/report/sweep_report.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +9,8 @@
 
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
+#include "app/report/run_report.hpp"
+#include "app/run/sweep_points.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {
@@ -150,13 +150,12 @@ LinePlot plot_over(const Sweep& sweep, std::size_t varied, const SweptObjective&
                 .logarithmic_y = low > 0 && std::log10(high / low) > kDecades,
                 .logarithmic_x = p.scale != ParameterScale::linear};
   const Point& best = *sweep.best.front();
-  PlotSeries ring{"best point", {best[1 + varied]}, {best[objective.judged]}, Mark::rings};
   if (sweep.varied.size() == 1) {
-    plot.series.push_back({objective.title(), all.x, all.y, Mark::line});
+    plot.series.push_back({objective.title(), all.x, all.y});
     all.part_of = 0;
   }
   plot.series.push_back(std::move(all));
-  plot.series.push_back(std::move(ring));
+  plot.series.push_back({"best point", {best[1 + varied]}, {best[objective.judged]}, Mark::rings});
   if (objective.lower) plot.limits.push_back({"at least", *objective.lower, false});
   if (objective.upper) plot.limits.push_back({"at most", *objective.upper, true});
   return plot;
@@ -184,8 +183,7 @@ std::string sweep_report(const Problem& problem, const SweepPoints& points, cons
   add_status(page, result);
   add_best_points(page, sweep);
   add_plots(page, sweep, table);
-  add_provenance(page, result);
-  return page.text();
+  return finished(page, result);
 }
 
 }  // namespace mbsopt

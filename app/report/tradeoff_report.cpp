@@ -1,19 +1,21 @@
-#include "app/report/tradeoff_report.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <functional>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
+#include "app/report/run_report.hpp"
 #include "app/results/sensor_unit.hpp"
 #include "app/results/tradeoff_results.hpp"
 #include "app/run/machine.hpp"
 #include "core/tableau/tableaus.hpp"
+#include "optim/tradeoff/penalty_study.hpp"
+#include "optim/tradeoff/tradeoff.hpp"
 #include "optim/tradeoff/tradeoff_table.hpp"
 
 namespace mbsopt {
@@ -208,35 +210,28 @@ std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff, const 
   add_plots(page, result, tradeoff, units);
   add_reference(page, result, tradeoff.reference);
   add_rows(page, tradeoff);
-  add_model(page, result);
-  add_provenance(page, result);
-  return page.text();
+  return finished(page, result);
 }
 
 std::string penalty_report(const Json& result, const PenaltyStudy& study) {
   HtmlPage page(report_title(result));
-  const auto add_plot = [&](const std::string& title, const std::string& label, std::vector<PlotSeries> series) {
-    for (PlotSeries& s : series)
-      for (const PenaltyStudyRow& row : study.rows) s.x.push_back(row.alpha);
-    page.plot({.title = title,
-               .x_label = "alpha [-]",
-               .y_label = label,
-               .series = std::move(series),
-               .logarithmic_y = true,
-               .logarithmic_x = true});
-  };
-  const auto over_alpha = [&](const auto& value_of) {
-    std::vector<double> values;
-    for (const PenaltyStudyRow& row : study.rows) values.push_back(value_of(row));
-    return values;
+  using OverAlpha = std::tuple<const char*, std::function<double(const PenaltyStudyRow&)>, Mark>;
+  const auto add_plot = [&](const std::string& title, const std::string& label, const std::vector<OverAlpha>& curves) {
+    LinePlot plot{
+        .title = title, .x_label = "alpha [-]", .y_label = label, .logarithmic_y = true, .logarithmic_x = true};
+    for (const auto& [name, value_of, mark] : curves) {
+      PlotSeries& series = plot.series.emplace_back(PlotSeries{name, {}, {}, mark});
+      for (const PenaltyStudyRow& row : study.rows) series.x.push_back(row.alpha), series.y.push_back(value_of(row));
+    }
+    page.plot(plot);
   };
   add_status(page, result);
   add_machine(page, result);
   page.heading("Accelerations");
   add_plot("Relative error of accelerations", "relative error [-]",
-           {{"penalty against the constrained equations", {}, over_alpha(std::mem_fn(&PenaltyStudyRow::model_error))},
-            {"rounding by Cholesky", {}, over_alpha(std::mem_fn(&PenaltyStudyRow::rounding_error))},
-            {"augmented Lagrangian", {}, over_alpha(std::mem_fn(&PenaltyStudyRow::augmented_error)), Mark::dashed}});
+           {{"penalty against the constrained equations", &PenaltyStudyRow::model_error, Mark::line},
+            {"rounding by Cholesky", &PenaltyStudyRow::rounding_error, Mark::line},
+            {"augmented Lagrangian", &PenaltyStudyRow::augmented_error, Mark::dashed}});
   std::vector<std::vector<std::string>> rows, runs;
   for (const PenaltyStudyRow& row : study.rows) {
     const std::string alpha = fmt::format("{:.0e}", row.alpha);
@@ -256,22 +251,18 @@ std::string penalty_report(const Json& result, const PenaltyStudy& study) {
   Eigen::Index column = 0;
   for (const Quantity& q : study.table.quantities()) {
     const auto errors_of = [&](std::size_t PenaltyStudyRow::*run) {
-      return over_alpha([&](const PenaltyStudyRow& row) { return study.table.rows[row.*run].errors(column); });
+      return [&, run, column](const PenaltyStudyRow& row) { return study.table.rows[row.*run].errors(column); };
     };
-    add_plot("Error of " + q.name, fmt::format("error of {} [{}]", q.name, q.relative ? "-" : kUnknownUnit),
-             {{"quasi-definite", {}, errors_of(&PenaltyStudyRow::quasidefinite)},
-              {"cholesky", {}, errors_of(&PenaltyStudyRow::cholesky)},
-              {"rounding by Cholesky on equal steps",
-               {},
-               over_alpha([&](const PenaltyStudyRow& row) { return row.rounding(column); }),
-               Mark::dashed}});
+    add_plot(
+        "Error of " + q.name, fmt::format("error of {} [{}]", q.name, q.relative ? "-" : kUnknownUnit),
+        {{"quasi-definite", errors_of(&PenaltyStudyRow::quasidefinite), Mark::line},
+         {"cholesky", errors_of(&PenaltyStudyRow::cholesky), Mark::line},
+         {"rounding by Cholesky on equal steps", [&](const auto& row) { return row.rounding(column); }, Mark::dashed}});
     ++column;
   }
   page.table({"alpha", "solver", "right-hand sides", "time [s]", "drift", "outcome"}, runs);
   add_reference(page, result, study.table.reference);
-  add_model(page, result);
-  add_provenance(page, result);
-  return page.text();
+  return finished(page, result);
 }
 
 }  // namespace mbsopt
