@@ -1,4 +1,4 @@
-// All commands: one row each.
+// All commands: one row each, with the options that CLI11 writes into CommandOptions.
 #pragma once
 
 #include <span>
@@ -6,7 +6,11 @@
 #include <string_view>
 #include <vector>
 
-#include "app/command/command_options.hpp"
+#include "app/run/command.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace mbsopt {
 
@@ -14,7 +18,7 @@ struct Command {
   std::string_view name;
   std::string_view does;
   int (*run)(const CommandContext&);
-  AddOptions* add_options;
+  void (*add_options)(CLI::App& sub, CommandOptions& options);
   std::string_view example;  // the part after "mbsopt NAME"
 };
 std::span<const Command> commands();
