@@ -13,6 +13,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/scene/scene_path.hpp"
 #include "core/start/model_warnings.hpp"
 #include "core/watch/start_failure.hpp"
 
@@ -49,26 +50,44 @@ Problem problem_of(const CommandContext& context, std::vector<std::string>& warn
 
 ReadOptions read_options(const CommandContext& context) { return {context.terms, context.options.allow_plugins}; }
 
-std::vector<std::string> data_files(const Problem& problem, const NamedTerms& terms) {
-  std::vector<std::string> files = problem.plugins;
-  if (!terms.empty()) files.push_back(std::filesystem::canonical("/proc/self/exe").string());
-  const auto add = [&](const std::optional<SampledLaw>& law) {
-    if (law) files.push_back(law->file);
+std::vector<NamedFiles> named_files(const Problem& problem) {
+  std::vector<NamedFiles> all;
+  const auto add_law = [&](const std::string& drive, const std::optional<SampledLaw>& law) {
+    if (law) all.push_back({drive + ".law.csv", {law->file}});
   };
-  for (const Signal& signal : problem.scene.signals) files.push_back(signal.file);
-  for (const Drive& drive : problem.scene.drives) add(drive.samples);
+  const auto add_laws = [&](const std::string& owner, const std::vector<DriveLaw>& laws) {
+    for (std::size_t k = 0; k < laws.size(); ++k) add_law(child_path(owner + ".drives", k), laws[k].samples);
+  };
+  const auto add_signals = [&](const std::string& path, const auto& signals) {
+    for (const auto& signal : signals) all.push_back({child_path(path, signal.name) + ".file", {signal.file}});
+  };
+  if (!problem.plugins.empty()) all.push_back({"plugins", problem.plugins, true});
+  add_signals("signals", problem.scene.signals);
+  for (std::size_t i = 0; i < problem.scene.drives.size(); ++i)
+    add_law(child_path("drives", i), problem.scene.drives[i].samples);
   for (const ObjectiveSpec& objective : problem.objectives)
-    for (const TrackTerm& term : objective.track) files.push_back(term.file);
-  for (const CaseSpec& c : problem.cases) {
-    for (const DriveLaw& law : c.drives) add(law.samples);
-    for (const SignalSamples& samples : c.signals) files.push_back(samples.file);
+    for (std::size_t k = 0; k < objective.track.size(); ++k)
+      all.push_back(
+          {child_path(child_path("objectives", objective.name) + ".track", k) + ".file", {objective.track[k].file}});
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+    add_laws(child_path("cases", c), problem.cases[c].drives);
+    add_signals(child_path("cases", c) + ".signals", problem.cases[c].signals);
   }
-  if (!problem.identification) return files;
-  for (const ExperimentSpec& e : problem.identification->experiments) {
-    files.insert(files.end(), e.data.begin(), e.data.end());
-    for (const SignalSamples& samples : e.signals) files.push_back(samples.file);
-    for (const DriveLaw& law : e.drives) add(law.samples);
+  for (std::size_t i = 0; problem.identification && i < problem.identification->experiments.size(); ++i) {
+    const ExperimentSpec& experiment = problem.identification->experiments[i];
+    const std::string place = child_path("identification.experiments", i);
+    all.push_back({place + ".data", experiment.data, experiment.data.size() != 1});
+    add_signals(place + ".signals", experiment.signals);
+    add_laws(place, experiment.drives);
   }
+  return all;
+}
+
+std::vector<std::string> data_files(const Problem& problem, const NamedTerms& terms) {
+  std::vector<std::string> files;
+  if (!terms.empty()) files.push_back(std::filesystem::canonical("/proc/self/exe").string());
+  for (const NamedFiles& named : named_files(problem))
+    files.insert(files.end(), named.files.begin(), named.files.end());
   return files;
 }
 
@@ -86,7 +105,7 @@ Run::Run(const CommandContext& given)
   if (!context.options.sweep.points.empty()) files.push_back(context.options.sweep.points);
   result["provenance"] = provenance(context.arguments, folder.owner(), context.options.problem_file, files);
   result["warnings"] = Json::array();
-  for (const std::string& warning : reader_warnings_) warn(warning);
+  warn(reader_warnings_);
   if (problem.columns_read.empty()) return;
   result["columns"] = Json::array();
   for (const std::string& words : problem.columns_read) {
@@ -145,6 +164,10 @@ void Run::warn(const std::string& words) {
   result["warnings"].push_back(warning);
 }
 
+void Run::warn(const std::vector<std::string>& all) {
+  for (const std::string& words : all) warn(words);
+}
+
 void Run::failed(const std::string& message, std::optional<double> last_good_time) {
   set(RunStatus::failed);
   result["message"] = message;
@@ -156,6 +179,10 @@ void Run::disagrees() { set(RunStatus::disagrees); }
 void Run::stopped(const std::string& kept) {
   set(RunStatus::interrupted);
   result["message"] = "interrupted; " + kept;
+}
+
+void Run::broke_off(const std::string& kept, const std::string& message, std::optional<double> last_good_time) {
+  interrupted() ? stopped(kept) : failed(message, last_good_time);
 }
 
 int Run::finish() {
@@ -184,7 +211,7 @@ bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, b
   } else {
     run.failed(assembly.result().message, scene.simulation.start_time);
   }
-  for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
+  run.warn(model_warnings(mechanism, assembly));
   if (integrated && !massless_bodies(mechanism, assembly).empty()) {
     const double start = scene.simulation.start_time;
     run.failed(start_failure(mechanism.data(), start), start);

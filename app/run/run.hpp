@@ -51,6 +51,7 @@ class Run {
   // Simulations call this after each step. It shows their progress, and returns false once the run is interrupted.
   std::function<bool(double t)> watched(std::string doing);
   void warn(const std::string& words);  // "simulation.accuracy: ...": with the path's place in the file before them
+  void warn(const std::vector<std::string>& all);
   // Replaces the settings of the file (accuracy_results.hpp).
   void simulate_with(const SimulationSettings& settings) { problem_.scene.simulation = settings; }
 
@@ -62,6 +63,8 @@ class Run {
   void failed(const std::string& message, std::optional<double> last_good_time = {});
   void disagrees();                       // exit 3
   void stopped(const std::string& kept);  // exit 130; kept: a sentence, what the folder holds
+  // Stopped if the user interrupted the run, else failed.
+  void broke_off(const std::string& kept, const std::string& message, std::optional<double> last_good_time = {});
 
   int finish();  // the exit code
 
@@ -75,7 +78,14 @@ class Run {
 
 ReadOptions read_options(const CommandContext& context);
 
-// The files that a problem names (data, plug-ins), and the program itself if it provides terms.
+// The files at one place of a problem file: data, plug-ins.
+struct NamedFiles {
+  std::string path;  // "identification.experiments[0].data"
+  std::vector<std::string> files;
+  bool is_list = false;  // at this place stands an array
+};
+std::vector<NamedFiles> named_files(const Problem& problem);
+// The same files, and the program itself if it provides terms.
 std::vector<std::string> data_files(const Problem& problem, const NamedTerms& terms);
 
 // Adds the model at its assembled start to the result and to standard output, with warnings of oddities. Returns false
