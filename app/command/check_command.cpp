@@ -220,13 +220,13 @@ int check_command(const CommandContext& context) {
   const GradientCheck check = check_gradients(needed, options);
   run.progress.finish();
   if (interrupted() || !check.ran) {
-    interrupted() ? run.stopped("nothing was compared") : run.failed(check.message, last_good_time);
+    run.broke_off("nothing was compared", check.message, last_good_time);
     return run.finish();
   }
 
   run.result["simulation"] = to_json(check.statistics);
   add_derivative_counts(run, needed.scene, check.statistics);
-  for (const std::string& warning : check.warnings) run.warn(warning);
+  run.warn(check.warnings);
   const Evaluator evaluator(needed.scene, objectives_of(needed));
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);

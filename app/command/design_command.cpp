@@ -235,8 +235,7 @@ int design_command(const CommandContext& context) {
   SimulatedMotion before = simulated_motion(run, parameter_values(scene));
   if (!before.simulation.ok() && !interrupted()) lead_to_closing(run, before);
   if (!before.simulation.ok()) {
-    interrupted() ? run.stopped("nothing was designed yet")
-                  : run.failed(before.simulation.message, before.simulation.last_good_time);
+    run.broke_off("nothing was designed yet", before.simulation.message, before.simulation.last_good_time);
     run.write("report.html",
               simulation_report(scene, run.result, before.trajectory,
                                 {.targets = prescribed_points(run.problem, before.instants), .forces = before.forces}));
@@ -245,8 +244,7 @@ int design_command(const CommandContext& context) {
   run.result["model"] = to_json(before.model);
   print_model(context.out, scene.name, before.model);
   const Mechanism mechanism(scene, parameter_values(scene));  // with derivatives, which the warnings look at
-  for (const std::string& warning : model_warnings(mechanism, Assembly(mechanism, scene.simulation.start_time)))
-    run.warn(warning);
+  run.warn(model_warnings(mechanism, Assembly(mechanism, scene.simulation.start_time)));
 
   LongRun long_run(run);
   const auto [design, cut_off] = minimised(run, long_run, before.psi);
@@ -257,8 +255,8 @@ int design_command(const CommandContext& context) {
   print_design(
       context.out, design, units,
       starts ? effort(run, design.simulations, design.wall_seconds) : fmt::format("{:.3g} s", design.wall_seconds));
-  for (const std::string& warning : design.warnings) run.warn(warning);
-  for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);
+  run.warn(design.warnings);
+  run.warn(design.final_evaluation.warnings);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
   const bool other_poses = design.mode && !design.mode->bodies.empty();
   if (other_poses) run.take_poses(design.mode->bodies);

@@ -72,14 +72,12 @@ void add_second_derivatives(Run& run, Evaluator& evaluator) {
   };
   const Hessians found = hessians(evaluator, evaluator.start(), options);
   run.progress.finish();
-  if (interrupted() || !found.ok) {
-    interrupted() ? run.stopped("the gradients are kept, there are no second derivatives")
-                  : run.failed("no second derivatives: " + found.message);
-    return;
-  }
+  if (interrupted() || !found.ok)
+    return run.broke_off("the gradients are kept, there are no second derivatives",
+                         "no second derivatives: " + found.message);
   add_hessians(run.result, found, objectives, parameters);
   print_hessians(run.context.out, found, objectives, parameters);
-  for (const std::string& warning : hessian_warnings(found, objectives)) run.warn(warning);
+  run.warn(hessian_warnings(found, objectives));
 }
 
 }  // namespace
@@ -116,11 +114,11 @@ int gradient_command(const CommandContext& context) {
   run.progress.finish();
   run.result["simulation"] = to_json(evaluation.statistics);
   add_derivative_counts(run, needed.scene, evaluation.statistics);
-  for (const std::string& warning : evaluation.warnings) run.warn(warning);
-  for (const std::string& doubt : gradient_doubts(evaluator, evaluation)) run.warn(doubt);
+  run.warn(evaluation.warnings);
+  run.warn(gradient_doubts(evaluator, evaluation));
   run.progress.finish();
   if (!evaluation.ok) {
-    interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
+    run.broke_off("no gradient was finished", evaluation.message, last_good_time);
     return run.finish();
   }
   const std::string method(to_string(evaluation.method));

@@ -59,7 +59,7 @@ std::optional<State> state_at(Run& run, const Mechanism& mechanism, double time)
                                                options);
   run.progress.finish();
   if (simulation.ok()) return state;
-  interrupted() ? run.stopped("nothing was linearised") : run.failed(simulation.message, simulation.last_good_time);
+  run.broke_off("nothing was linearised", simulation.message, simulation.last_good_time);
   return {};
 }
 

@@ -62,15 +62,8 @@ int resume_command(const CommandContext& context) {
   options.allow_plugins = context.options.allow_plugins;  // a folder of somebody else's must not decide it
   options.out = folder.string();
   options.resume = true;
-  const CommandContext again{.command = command,
-                             .arguments = arguments,
-                             .options = options,
-                             .out = context.out,
-                             .err = context.err,
-                             .err_is_terminal = context.err_is_terminal,
-                             .json = context.json,
-                             .terms = context.terms,
-                             .ranks = context.ranks};
+  CommandContext again = context;
+  again.command = command, again.arguments = arguments, again.options = options;
   if (command == "design") return design_command(again);
   if (command == "identify") return identify_command(again);
   if (command == "sweep") return sweep_command(again);

@@ -51,7 +51,7 @@ int simulate_command(const CommandContext& context) {
   if (!settle_accuracy(run)) return run.finish();
   const SimulatedMotion motion = simulated_motion(run, parameter_values(scene));
   const SimulationResult& simulation = motion.simulation;
-  for (const std::string& warning : motion.warnings) run.warn(warning);
+  run.warn(motion.warnings);
   if (simulation.status != SimulationStatus::assembly_failed) {
     run.result["model"] = to_json(motion.model);
     run.result["simulation"] = to_json(simulation.statistics);
@@ -60,8 +60,7 @@ int simulate_command(const CommandContext& context) {
     if (!simulation.ok()) simulated.simulation.end_time = simulation.last_good_time;
     print_simulation(context.out, simulated, simulation.statistics);
     write_trajectory(run, motion.trajectory, simulation.statistics.singular);
-    for (const std::string& warning : simulation_warnings(scene, simulation.statistics, simulation.ok()))
-      run.warn(warning);
+    run.warn(simulation_warnings(scene, simulation.statistics, simulation.ok()));
     warn_of_stiffness(run, simulation.statistics, false);
   }
   if (simulation.ok()) {

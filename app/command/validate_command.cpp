@@ -64,7 +64,7 @@ int validate_command(const CommandContext& context) {
     Problem problem = run.problem;
     problem.scene.simulation.accuracy.reset();  // the default integrator guesses the starts
     const CutProblem cut = cut_into_windows(problem, data_of(problem), {}, [](double) { return !interrupted(); });
-    for (const std::string& warning : cut.warnings) run.warn(warning);
+    run.warn(cut.warnings);
     add_windows(run, cut.problem);
     const std::vector<ChannelData> channels = channel_data(cut.problem, cut.data);
     context.out << '\n' << channel_table(channels);
