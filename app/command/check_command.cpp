@@ -7,7 +7,6 @@
 #include "app/results/case_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/results/objective_values.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"
@@ -18,6 +17,21 @@
 
 namespace mbsopt {
 namespace {
+
+struct ComparedMethod {
+  const char* key;   // in result.json
+  const char* name;  // in the table of costs
+  const MethodCost& cost;
+  const Eigen::MatrixXd& psi_rho;
+};
+
+std::vector<ComparedMethod> compared_methods(const GradientCheck& check) {
+  std::vector<ComparedMethod> methods{{"adjoint", "adjoint", check.adjoint_cost, check.adjoint},
+                                      {"tlm", "tlm", check.tlm_cost, check.tlm}};
+  if (check.discrete) methods.push_back({"fd_frozen", "differences, frozen steps", check.frozen_cost, check.frozen});
+  methods.push_back({"fd_free", "differences, free steps", check.free_cost, check.free});
+  return methods;
+}
 
 // "agrees 3.1e-14": the verdict, and its relative difference.
 std::string compared(Verdict verdict, double difference) {
@@ -34,8 +48,7 @@ void print_entries(std::ostream& out, const GradientCheck& check, const Objectiv
                          : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
                            "frozen. Relative to tlm:\n");
   for (std::size_t i = 0; i < check.objectives.size(); ++i) {
-    out << fmt::format("\n{} = {}{}{}\n", check.objectives[i], significant(check.psi(static_cast<Eigen::Index>(i)), 12),
-                       after_value(units, check.objectives[i]), true_extreme_text(true_values[i]));
+    out << '\n' << objective_line(check.objectives[i], check.psi(static_cast<Eigen::Index>(i)), true_values[i], units);
     TextTable table(
         {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
     for (const CheckedEntry& e : check.entries) {
@@ -103,10 +116,7 @@ void print_costs(std::ostream& out, const GradientCheck& check) {
         {name, fmt::format("{:.2g}", cost.wall_seconds), fmt::format("{:.{}f}", cost.ratio, cost.ratio < 10 ? 1 : 0)});
   };
   add("one simulation", check.simulation);
-  add("adjoint", check.adjoint_cost);
-  add("tlm", check.tlm_cost);
-  if (check.discrete) add("differences, frozen steps", check.frozen_cost);
-  add("differences, free steps", check.free_cost);
+  for (const ComparedMethod& method : compared_methods(check)) add(method.name, method.cost);
   out << '\n' << table.text();
   out << fmt::format(
       "one simulation: a run with the same objectives and tolerances, without derivatives; medians of {} in turn with "
@@ -116,12 +126,8 @@ void print_costs(std::ostream& out, const GradientCheck& check) {
 
 Json gradient_json(const GradientCheck& check, const Eigen::MatrixXd& psi_rho) {
   Json gradient = Json::object();
-  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
-    for (std::size_t k = 0; k < check.parameters.size(); ++k) {
-      gradient[check.objectives[i]][check.parameters[k]] =
-          psi_rho(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
-    }
-  }
+  for (std::size_t i = 0; i < check.objectives.size(); ++i)
+    gradient[check.objectives[i]] = by_name(check.parameters, psi_rho.row(static_cast<Eigen::Index>(i)));
   return gradient;
 }
 
@@ -143,21 +149,16 @@ void add_continuous(Json& result, const GradientCheck& check) {
 }
 
 void add_to_result(Json& result, const GradientCheck& check, const std::vector<std::optional<double>>& true_values) {
-  const Json adjoint = gradient_json(check, check.adjoint);
   for (std::size_t i = 0; i < check.objectives.size(); ++i) {
-    const std::string& name = check.objectives[i];
-    result["objectives"][name] = objective_json(check.psi(static_cast<Eigen::Index>(i)), true_values[i]);
-    result["objectives"][name]["gradient"] = adjoint.value(name, Json::object());
+    const Eigen::Index row = static_cast<Eigen::Index>(i);
+    Json& objective = result["objectives"][check.objectives[i]];
+    objective = objective_json(check.psi(row), true_values[i]);
+    objective["gradient"] = by_name(check.parameters, check.adjoint.row(row));
   }
-  const auto add = [&](const char* name, const MethodCost& cost, const Eigen::MatrixXd& psi_rho) {
-    result["methods"][name] = {{"wall_seconds", cost.wall_seconds},
-                               {"simulations_wall_ratio", cost.ratio},
-                               {"gradient", gradient_json(check, psi_rho)}};
-  };
-  add("adjoint", check.adjoint_cost, check.adjoint);
-  add("tlm", check.tlm_cost, check.tlm);
-  if (check.discrete) add("fd_frozen", check.frozen_cost, check.frozen);
-  add("fd_free", check.free_cost, check.free);
+  for (const ComparedMethod& method : compared_methods(check))
+    result["methods"][method.key] = {{"wall_seconds", method.cost.wall_seconds},
+                                     {"simulations_wall_ratio", method.cost.ratio},
+                                     {"gradient", gradient_json(check, method.psi_rho)}};
 
   Json& verdict = result["verdict"];
   verdict["passed"] = check.passed();
@@ -184,13 +185,10 @@ void add_to_result(Json& result, const GradientCheck& check, const std::vector<s
     for (const TaylorRow& row : t.rows) taylor["h"].push_back(row.h), taylor["remainder"].push_back(row.remainder);
   }
   for (const IdentityCheck& i : check.identities) {
-    Json weights, direction;
-    for (std::size_t k = 0; k < check.objectives.size(); ++k)
-      weights[check.objectives[k]] = i.w(static_cast<Eigen::Index>(k));
-    for (std::size_t k = 0; k < check.parameters.size(); ++k)
-      direction[check.parameters[k]] = i.d(static_cast<Eigen::Index>(k));
-    verdict["identities"].push_back(
-        {{"weights", weights}, {"direction", direction}, {"relative_defect", i.relative_defect}, {"passed", i.passed}});
+    verdict["identities"].push_back({{"weights", by_name(check.objectives, i.w)},
+                                     {"direction", by_name(check.parameters, i.d)},
+                                     {"relative_defect", i.relative_defect},
+                                     {"passed", i.passed}});
   }
 }
 

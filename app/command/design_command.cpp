@@ -7,7 +7,6 @@
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/results/objective_values.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/simulated_motion.hpp"
 #include "app/results/write_trajectory.hpp"
@@ -24,8 +23,6 @@
 namespace mbsopt {
 namespace {
 
-Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-
 void print_design(std::ostream& out, const DesignResult& design, const ObjectiveUnits& units,
                   const std::string& effort) {
   TextTable parameters({"parameter", "initial", end_of_search(to_string(design.status)), "unit", "at bound"});
@@ -33,36 +30,23 @@ void print_design(std::ostream& out, const DesignResult& design, const Objective
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
                     bound_hit(v.at_lower, v.at_upper)});
   }
-  const auto of_case = [&](const std::string& name) { return fmt::format("{} ({})", design.objective, name); };
-  const bool any_smooth =
-      design.objective_true || std::any_of(design.constraints.begin(), design.constraints.end(),
-                                           [](const DesignConstraint& c) { return c.true_value.has_value(); });
-  std::vector<std::string> header{"objective", "unit", "before", "after"};
-  if (any_smooth) header.push_back("true extreme");
-  if (!design.constraints.empty()) header.insert(header.end(), {"at least", "at most", "price"});
-  TextTable objectives(header);
-  const auto row = [&](const std::string& name, const std::string& objective, double before, double after,
-                       const std::optional<double>& true_value) {
-    std::vector<std::string> cells{name, shown_unit(units, objective), significant(before), significant(after)};
-    if (any_smooth) cells.push_back(true_value ? significant(*true_value) : "");
-    return cells;
+  TextTable objectives({"objective", "unit", "before", "after", "true extreme", "at least", "at most", "price"});
+  const auto add = [&](const std::string& name, const std::string& objective, const auto& of,
+                       const std::vector<std::string>& limits) {
+    std::vector<std::string> cells{name, shown_unit(units, objective), significant(of.initial), significant(of.value),
+                                   or_blank(of.true_value)};
+    cells.insert(cells.end(), limits.begin(), limits.end());
+    objectives.add(std::move(cells));
   };
-  std::vector<std::string> minimised =
-      row(design.objective, design.objective, design.objective_initial, design.objective_final, design.objective_true);
-  minimised.resize(header.size());
-  objectives.add(minimised);
-  for (const DesignCase& c : design.cases) {
-    std::vector<std::string> cells = row(of_case(c.name), design.objective, c.initial, c.value, c.true_value);
-    cells.resize(header.size());
-    objectives.add(cells);
-  }
-  const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
-  for (const DesignConstraint& c : design.constraints) {
-    std::vector<std::string> cells = row(c.in_words(), c.objective, c.initial, c.value, c.true_value);
-    cells.insert(cells.end(), {bound(c.lower), bound(c.upper), c.price != 0 ? significant(c.price) : ""});
-    objectives.add(cells);
-  }
-  out << '\n' << parameters.text() << '\n' << objectives.text();
+  add(design.objective, design.objective,
+      DesignCase{"", 1, design.objective_initial, design.objective_final, design.objective_true}, {});
+  for (const DesignCase& c : design.cases)
+    add(fmt::format("{} ({})", design.objective, c.name), design.objective, c, {});
+  for (const DesignConstraint& c : design.constraints)
+    add(c.in_words(), c.objective, c, {or_blank(c.lower), or_blank(c.upper), c.price != 0 ? significant(c.price) : ""});
+  std::vector<std::string> unless_empty{"true extreme"};
+  if (design.constraints.empty()) unless_empty.insert(unless_empty.end(), {"at least", "at most", "price"});
+  out << '\n' << parameters.text() << '\n' << objectives.text(unless_empty);
   out << fmt::format("\n{} {}: {}, {}, {}{}\n", design.optimizer, to_string(design.status),
                      counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"), effort,
                      design.seed ? fmt::format(", seed {}", *design.seed) : "");
@@ -124,7 +108,7 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"wall_seconds", design.wall_seconds},
                          {"objective_initial", design.objective_initial},
                          {"objective_final", design.objective_final},
-                         {"optimality", number_or_null(design.optimality)},
+                         {"optimality", std::isfinite(design.optimality) ? Json(design.optimality) : Json()},
                          {"infeasibility", design.violation},
                          {"true_infeasibility", design.true_violation}};
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
@@ -137,6 +121,13 @@ void add_to_result(Json& result, const DesignResult& design) {
     result["conflicts"].push_back({{"limit", c.limit}, {"missed", c.missed}, {"price", c.price}});
 }
 
+// The bound of an extreme as a line in the plot of what it is taken of.
+std::vector<PlotLimit> limits_of(const ObjectiveBound& bound, Extreme extreme, const std::string& before = "") {
+  if (extreme == Extreme::maximum && bound.upper) return {{before + "at most", *bound.upper, true}};
+  if (extreme == Extreme::minimum && bound.lower) return {{before + "at least", *bound.lower, false}};
+  return {};
+}
+
 // Limits that bound the extreme of a sensor bound the sensor at all times.
 SensorLimits sensor_limits(const Problem& problem) {
   SensorLimits limits;
@@ -144,13 +135,9 @@ SensorLimits sensor_limits(const Problem& problem) {
     const auto spec = std::ranges::find(problem.objectives, bound.objective, &ObjectiveSpec::name);
     if (spec == problem.objectives.end()) continue;
     for (std::size_t k = 0; k < std::size(kMeanKinds); ++k) {
-      const bool largest = kMeanKinds[k].extreme == Extreme::maximum;
-      const bool smallest = kMeanKinds[k].extreme == Extreme::minimum;
       if (!spec->means[k]) continue;
-      if (largest && bound.upper)
-        limits.push_back({spec->means[k]->text(), {bound.objective + ", at most", *bound.upper, true}});
-      if (smallest && bound.lower)
-        limits.push_back({spec->means[k]->text(), {bound.objective + ", at least", *bound.lower, false}});
+      for (const PlotLimit& limit : limits_of(bound, kMeanKinds[k].extreme, bound.objective + ", "))
+        limits.push_back({spec->means[k]->text(), limit});
     }
   }
   return limits;
@@ -170,11 +157,7 @@ std::vector<RunningTerm> running_terms(const Problem& problem, const ObjectiveUn
       term.title = fmt::format("{}: {} this over time", spec.name, kMeanKinds[k].name);
       term.y_label = fmt::format("{} [{}]", text, unit);
       const auto bound = std::ranges::find(problem.design->subject_to, spec.name, &ObjectiveBound::objective);
-      if (bound == problem.design->subject_to.end()) continue;
-      if (kMeanKinds[k].extreme == Extreme::maximum && bound->upper)
-        term.limits.push_back({"at most", *bound->upper, true});
-      if (kMeanKinds[k].extreme == Extreme::minimum && bound->lower)
-        term.limits.push_back({"at least", *bound->lower, false});
+      if (bound != problem.design->subject_to.end()) term.limits = limits_of(*bound, kMeanKinds[k].extreme);
     }
     if (!is_sensor) terms.push_back(std::move(term));
   }

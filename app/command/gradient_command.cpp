@@ -9,7 +9,6 @@
 #include "app/results/hessian_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/results/objective_values.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"
@@ -33,19 +32,13 @@ const std::map<std::string, GradientMethod> kMethods{{"auto", GradientMethod::au
 void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<std::optional<double>>& true_values) {
   const Scene& scene = run.problem.scene;
   std::vector<std::string> header{"parameter", "value"};
-  std::vector<std::string> values{"", ""};
   const ObjectiveUnits units = objective_units(run.problem);
   for (std::size_t i = 0; i < run.problem.objectives.size(); ++i) {
     const std::string& name = run.problem.objectives[i].name;
     const auto row = static_cast<Eigen::Index>(i);
-    Json gradient = Json::object();
-    for (std::size_t k = 0; k < scene.parameters.size(); ++k) {
-      gradient[scene.parameters[k].name] = evaluation.psi_rho(row, static_cast<Eigen::Index>(k));
-    }
     run.result["objectives"][name] = objective_json(evaluation.psi(row), true_values[i]);
-    run.result["objectives"][name]["gradient"] = gradient;
-    run.context.out << fmt::format("{} = {}{}{}\n", name, significant(evaluation.psi(row), 12),
-                                   after_value(units, name), true_extreme_text(true_values[i]));
+    run.result["objectives"][name]["gradient"] = by_name(names_of(scene.parameters), evaluation.psi_rho.row(row));
+    run.context.out << objective_line(name, evaluation.psi(row), true_values[i], units);
     header.push_back("d " + name);
   }
   add_units(run.result, units);
@@ -62,9 +55,8 @@ void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<st
 
 // The gradients are complete and stay, even if this fails.
 void add_second_derivatives(Run& run, Evaluator& evaluator) {
-  std::vector<std::string> objectives, parameters;
-  for (const ObjectiveSpec& objective : run.problem.objectives) objectives.push_back(objective.name);
-  for (const Parameter& parameter : run.problem.scene.parameters) parameters.push_back(parameter.name);
+  const std::vector<std::string> objectives = names_of(run.problem.objectives);
+  const std::vector<std::string> parameters = names_of(run.problem.scene.parameters);
   HessianOptions options;
   options.progress = [&](int done, int of) {
     run.progress.fraction("second derivatives", static_cast<double>(done) / of);

@@ -1,12 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/results/objective_values.hpp"
 #include "app/results/sensitivities_csv.hpp"
 #include "app/results/simulated_motion.hpp"
 #include "app/results/write_trajectory.hpp"
@@ -21,24 +18,18 @@ namespace {
 void add_objectives(Run& run, const SimulatedMotion& motion) {
   const Eigen::VectorXd& psi = motion.psi;
   if (psi.size() == 0) return;
-  const bool any_smooth = std::any_of(motion.true_values.begin(), motion.true_values.end(),
-                                      [](const std::optional<double>& value) { return value.has_value(); });
   const ObjectiveUnits units = objective_units(run.problem);
-  std::vector<std::string> header{"objective", "value", "unit"};
-  if (any_smooth) header.push_back("true extreme");
-  TextTable table(header);
+  TextTable table({"objective", "value", "unit", "true extreme"});
   for (Eigen::Index i = 0; i < psi.size(); ++i) {
     const std::string& name = run.problem.objectives[static_cast<std::size_t>(i)].name;
     const std::optional<double>& true_value = motion.true_values[static_cast<std::size_t>(i)];
     run.result["objectives"][name] = objective_json(psi(i), true_value);
     if (const std::vector<double>& instants = motion.instants[static_cast<std::size_t>(i)]; !instants.empty())
       run.result["objectives"][name]["instants"] = instants;
-    std::vector<std::string> row{name, significant(psi(i), 10), shown_unit(units, name)};
-    if (any_smooth) row.push_back(true_value ? significant(*true_value, 10) : "");
-    table.add(row);
+    table.add({name, significant(psi(i), 10), shown_unit(units, name), or_blank(true_value, 10)});
   }
   add_units(run.result, units);
-  run.context.out << '\n' << table.text();
+  run.context.out << '\n' << table.text({"true extreme"});
 }
 
 }  // namespace

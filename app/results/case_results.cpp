@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <thread>
 
-#include "app/results/objective_values.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "optim/check/gradient_check.hpp"
@@ -23,16 +23,16 @@ int case_threads(const Run& run) {
 void add_cases(Run& run, bool gradients, GradientMethod method) {
   const Problem& problem = run.problem;
   if (problem.cases.empty() || problem.objectives.empty() || interrupted()) return;
-  std::vector<std::string> objectives, parameters, header{"case"};
-  for (const ObjectiveSpec& o : problem.objectives) objectives.push_back(o.name);
-  for (const Parameter& p : problem.scene.parameters) parameters.push_back(p.name);
+  const std::vector<std::string> objectives = names_of(problem.objectives);
+  const std::vector<std::string> parameters = names_of(problem.scene.parameters);
+  std::vector<std::string> header{"case"};
   EvaluatorOptions options;
   options.method = method, options.progress = run.watched("load cases");
   CaseEvaluator evaluator(problem, objectives, parameters, options, case_threads(run));
   const Eigen::VectorXd rho = evaluator.start();
   const CaseEvaluation& all = gradients ? evaluator.gradients(rho) : evaluator.values(rho);
   run.progress.finish();
-  if (!all.ok) return interrupted() ? run.stopped("the load cases are incomplete") : run.failed(all.message);
+  if (!all.ok) return run.broke_off("the load cases are incomplete", all.message);
   const std::vector<std::optional<double>> true_values = evaluator.true_values(rho);
   header.insert(header.end(), objectives.begin(), objectives.end());
   TextTable table(header);
@@ -44,8 +44,7 @@ void add_cases(Run& run, bool gradients, GradientMethod method) {
       const Eigen::Index at = static_cast<Eigen::Index>(i);
       const std::optional<double>& true_value = true_values[c * objectives.size() + i];
       result[objectives[i]] = objective_json(e.psi(at), true_value);
-      for (std::size_t k = 0; k < parameters.size() && gradients; ++k)
-        result[objectives[i]]["gradient"][parameters[k]] = e.psi_rho(at, static_cast<Eigen::Index>(k));
+      if (gradients && !parameters.empty()) result[objectives[i]]["gradient"] = by_name(parameters, e.psi_rho.row(at));
       row.push_back(significant(e.psi(at), 10) +
                     (true_value ? fmt::format(" ({})", significant(*true_value, 10)) : ""));
     }
@@ -66,9 +65,9 @@ bool check_cases(Run& run) {
     const GradientCheck check = check_gradients(of_case, options);
     run.progress.finish();
     if (interrupted() || !check.ran) {
-      interrupted() ? run.stopped("not all load cases were compared")
-                    : run.failed(fmt::format("case '{}': {}", load_case.name,
-                                             in_names_of_problem(check.message, load_case, run.problem.scene)));
+      run.broke_off("not all load cases were compared",
+                    fmt::format("case '{}': {}", load_case.name,
+                                in_names_of_problem(check.message, load_case, run.problem.scene)));
       return true;
     }
     all_agree = all_agree && check.passed();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/results/objective_units.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 
@@ -33,13 +34,11 @@ void add_hessians(Json& result, const Hessians& hessians, const std::vector<std:
                   const std::vector<std::string>& parameters) {
   for (std::size_t i = 0; i < objectives.size(); ++i) {
     const ObjectiveHessian& H = hessians.of[i];
-    Json matrix = Json::object();
-    for (std::size_t p = 0; p < parameters.size(); ++p) {
-      for (std::size_t q = 0; q < parameters.size(); ++q)
-        matrix[parameters[p]][parameters[q]] = H.value(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(q));
-    }
-    result["objectives"][objectives[i]]["hessian"] = matrix;
-    result["objectives"][objectives[i]]["hessian_error"] = H.relative();
+    Json& objective = result["objectives"][objectives[i]];
+    objective["hessian"] = Json::object();
+    for (std::size_t p = 0; p < parameters.size(); ++p)
+      objective["hessian"][parameters[p]] = by_name(parameters, H.value.row(static_cast<Eigen::Index>(p)));
+    objective["hessian_error"] = H.relative();
   }
   result["methods"]["hessian"] = {{"wall_seconds", hessians.wall_seconds}, {"gradients", hessians.gradients}};
   result["hessian_method"] = hessian_method(hessians.method);

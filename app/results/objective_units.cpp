@@ -1,9 +1,12 @@
 #include "app/results/objective_units.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <optional>
 
 #include "app/results/sensor_unit.hpp"
+#include "app/terminal/text_table.hpp"
 #include "core/expression/dimension_inference.hpp"
 #include "core/scene/scene_facts.hpp"
 
@@ -107,6 +110,18 @@ std::string shown_unit(const ObjectiveUnits& units, const std::string& objective
 std::string after_value(const ObjectiveUnits& units, const std::string& objective) {
   const std::string unit = shown_unit(units, objective);
   return unit == "-" || unit == kUnknownUnit ? "" : " " + unit;
+}
+
+Json objective_json(double value, const std::optional<double>& true_value) {
+  Json json{{"value", value}};
+  if (true_value) json["true_value"] = *true_value;
+  return json;
+}
+
+std::string objective_line(const std::string& name, double value, const std::optional<double>& true_value,
+                           const ObjectiveUnits& units) {
+  return fmt::format("{} = {}{}{}\n", name, significant(value, 12), after_value(units, name),
+                     true_value ? fmt::format("   (true extreme: {})", significant(*true_value, 10)) : "");
 }
 
 void add_units(Json& result, const ObjectiveUnits& units) {

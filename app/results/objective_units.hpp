@@ -1,10 +1,13 @@
-// SI units of the values of objectives, from those of their sensors, parameters and the time.
+// Objectives in results: their values, beside a smooth maximum or minimum the true one, their gradients, and their SI
+// units, from those of their sensors, parameters and the time.
 //
 //   objective_units(problem).at("path");   // "m^2" of samples of (x - 0.1)^2, "-" of a number
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "app/files/result_json.hpp"
 #include "optim/problem/problem.hpp"
@@ -20,6 +23,25 @@ std::string shown_unit(const ObjectiveUnits& units, const std::string& objective
 
 // " m^2 s" to follow a value; empty for a number or an unknown unit.
 std::string after_value(const ObjectiveUnits& units, const std::string& objective);
+
+Json objective_json(double value, const std::optional<double>& true_value);
+// "peak = 0.21 m   (true extreme: 0.213)", and the end of the line.
+std::string objective_line(const std::string& name, double value, const std::optional<double>& true_value,
+                           const ObjectiveUnits& units);
+
+template <class Named>
+std::vector<std::string> names_of(const std::vector<Named>& list) {
+  std::vector<std::string> names;
+  for (const Named& x : list) names.push_back(x.name);
+  return names;
+}
+
+// {"k1": 0.3, "L01": 2.1}: the entries of a vector, such as a gradient, by name.
+Json by_name(const std::vector<std::string>& names, const auto& values) {
+  Json json = Json::object();
+  for (std::size_t k = 0; k < names.size(); ++k) json[names[k]] = values(static_cast<Eigen::Index>(k));
+  return json;
+}
 
 // Adds "unit" to each objective of a result and of its load cases whose unit is known.
 void add_units(Json& result, const ObjectiveUnits& units);

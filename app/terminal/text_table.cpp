@@ -27,8 +27,19 @@ std::string padded(const std::string& cell, std::size_t to, bool right) {
 
 }  // namespace
 
-std::string TextTable::text() const {
+void TextTable::add(std::vector<std::string> row) {
+  row.resize(header_.size());
+  rows_.push_back(std::move(row));
+}
+
+std::string TextTable::text(const std::vector<std::string>& unless_empty) const {
   const std::size_t columns = header_.size();
+  const auto is_shown = [&](std::size_t c) {
+    return std::ranges::find(unless_empty, header_[c]) == unless_empty.end() ||
+           std::ranges::any_of(rows_, [c](const auto& row) { return !row[c].empty(); });
+  };
+  std::vector<bool> shown(columns);
+  for (std::size_t c = 0; c < columns; ++c) shown[c] = is_shown(c);
   std::vector<std::size_t> widths(columns);
   std::vector<bool> numeric(columns, true);
   for (std::size_t c = 0; c < columns; ++c) widths[c] = width(header_[c]);
@@ -41,6 +52,7 @@ std::string TextTable::text() const {
   const auto line = [&](const std::vector<std::string>& cells) {
     std::string out;
     for (std::size_t c = 0; c < columns; ++c) {
+      if (!shown[c]) continue;
       out += (c == 0 ? "" : "  ") + padded(cells[c], widths[c], numeric[c] && !rows_.empty());
     }
     out.erase(out.find_last_not_of(' ') + 1);
@@ -53,6 +65,10 @@ std::string TextTable::text() const {
 
 std::string significant(double value, int digits) {
   return std::isnan(value) ? "-" : fmt::format("{:.{}g}", value, digits);
+}
+
+std::string or_blank(const std::optional<double>& value, int digits) {
+  return value ? significant(*value, digits) : std::string();
 }
 
 }  // namespace mbsopt

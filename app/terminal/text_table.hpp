@@ -5,6 +5,7 @@
 //   out << table.text();
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,9 +14,10 @@ namespace mbsopt {
 class TextTable {
  public:
   explicit TextTable(std::vector<std::string> header) : header_(std::move(header)) {}
-  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
+  void add(std::vector<std::string> row);  // cells that it lacks are empty
   bool empty() const { return rows_.empty(); }
-  std::string text() const;
+  // Leaves out those of the named columns that have empty cells only.
+  std::string text(const std::vector<std::string>& unless_empty = {}) const;
 
  private:
   std::vector<std::string> header_;
@@ -23,5 +25,6 @@ class TextTable {
 };
 
 std::string significant(double value, int digits = 7);  // "2.146954", "1.2e-05", "-"  where it is not a number
+std::string or_blank(const std::optional<double>& value, int digits = 7);
 
 }  // namespace mbsopt
