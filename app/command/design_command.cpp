@@ -9,7 +9,6 @@
 #include "app/results/objective_units.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/simulated_motion.hpp"
-#include "app/results/write_trajectory.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/starts/design_starts.hpp"

@@ -8,8 +8,7 @@
 #include "app/report/run_report.hpp"
 #include "app/results/joint_forces.hpp"
 #include "app/results/sensor_unit.hpp"
-#include "app/results/trajectory_csv.hpp"
-#include "app/results/write_trajectory.hpp"
+#include "app/results/simulated_motion.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"
@@ -81,14 +80,6 @@ void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
     run.context.out << "\nforce or torque of each drive along its coordinate\n" << table.text();
 }
 
-// Returns their times, for the plots.
-std::vector<PlotInstant> add_singular(Run& run, const KinematicsResult& kinematics) {
-  std::vector<PlotInstant> instants;
-  if (const std::string words = in_words(kinematics.singular, {}); !words.empty()) run.warn(words);
-  for (const SingularPosition& s : kinematics.singular) instants.push_back({"singular", s.t});
-  return instants;
-}
-
 }  // namespace
 
 int kinematics_command(const CommandContext& context) {
@@ -140,7 +131,9 @@ int kinematics_command(const CommandContext& context) {
   write_trajectory(run, trajectory, kinematics.singular);
   if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
   add_drives(run, scene, efforts);
-  const std::vector<PlotInstant> singular = add_singular(run, kinematics);
+  if (const std::string words = in_words(kinematics.singular, {}); !words.empty()) run.warn(words);
+  std::vector<PlotInstant> singular;
+  for (const SingularPosition& s : kinematics.singular) singular.push_back({"singular", s.t});
   if (motion_ends_early) {
     run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", kinematics.last_good_time));
   } else if (!finite) {

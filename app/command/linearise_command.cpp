@@ -5,6 +5,8 @@
 #include <stdexcept>
 
 #include "app/report/run_report.hpp"
+#include "app/results/objective_units.hpp"
+#include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"
@@ -24,8 +26,7 @@ constexpr double kWrongDigits = 1e-6;  // of an eigenvalue: larger errors are re
 template <class Named>
 std::vector<int> places(const char* option, const char* kind, const std::vector<std::string>& names,
                         const std::vector<Named>& list) {
-  std::vector<std::string> known;
-  for (const Named& x : list) known.push_back(x.name);
+  const std::vector<std::string> known = names_of(list);
   std::vector<int> out;
   for (const std::string& name : names) {
     const auto found = std::find(known.begin(), known.end(), name);
@@ -161,17 +162,6 @@ void warn_of(Run& run, const Linearisation& x, const State& state) {
   }
 }
 
-// t and the bodies' part of a row of trajectory.csv.
-std::vector<double> row_of(const Mechanism& mechanism, double t, const Eigen::VectorXd& y,
-                           const Eigen::VectorXd& angles) {
-  std::vector<double> row{t};
-  for (int body = 0; body < mechanism.bodies(); ++body) {
-    const auto values = body_row(mechanism, body, {t, y, angles});
-    row.insert(row.end(), values.begin(), values.end());
-  }
-  return row;
-}
-
 // The state displaced along a mode. The largest displacement is a sixth of the mechanism's size.
 std::vector<double> displaced_row(const Mechanism& mechanism, const State& state, const Linearisation& x,
                                   Eigen::Index mode) {
@@ -187,7 +177,7 @@ std::vector<double> displaced_row(const Mechanism& mechanism, const State& state
   Eigen::VectorXd y = state.y;
   y.head(layout.positions()) += (x.length / 6 / largest) * q.real();
   for (int k = 1; k <= layout.n; ++k) y.segment<4>(layout.p(k)).normalize();
-  return row_of(mechanism, state.t, y, state.angles);
+  return body_columns(mechanism, {state.t, y, state.angles});
 }
 
 }  // namespace
@@ -227,8 +217,8 @@ int linearise_command(const CommandContext& context) {
   for (Eigen::Index k = 0; k < x.eigenvalues.size(); ++k) {
     if (x.eigenvalues(k).imag() >= 0) shapes.push_back(displaced_row(mechanism, *state, x, k));
   }
-  run.write("report.html",
-            linearisation_report(scene, run.result, x, row_of(mechanism, state->t, state->y, state->angles), shapes));
+  run.write("report.html", linearisation_report(scene, run.result, x,
+                                                body_columns(mechanism, {state->t, state->y, state->angles}), shapes));
   return run.finish();
 }
 

@@ -6,7 +6,6 @@
 #include "app/results/objective_units.hpp"
 #include "app/results/sensitivities_csv.hpp"
 #include "app/results/simulated_motion.hpp"
-#include "app/results/write_trajectory.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/text_table.hpp"

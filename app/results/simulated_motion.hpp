@@ -1,4 +1,5 @@
-// A scene simulated at given parameters, with its rows for trajectory.csv and the values of objectives.
+// A scene simulated at given parameters, with its rows for trajectory.csv and the values of objectives. The files of a
+// motion.
 #pragma once
 
 #include "app/results/trajectory_csv.hpp"
@@ -20,5 +21,9 @@ struct SimulatedMotion {
 
 // Draws the progress of `run`, and stops if the user interrupts.
 SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho);
+
+// Writes trajectory.csv into the folder of the run; with --mat and --gnuplot also trajectory.mat and trajectory.gp.
+// Warns of each column with empty cells. Ctrl-C stops the run without the files.
+void write_trajectory(Run& run, const Trajectory& trajectory, const std::vector<SingularPosition>& singular);
 
 }  // namespace mbsopt

@@ -21,17 +21,21 @@ std::vector<std::string> trajectory_columns(const Scene& scene) {
   return columns;
 }
 
+std::vector<double> body_columns(const Mechanism& mechanism, const StatePoint& at) {
+  std::vector<double> row{at.t};
+  for (int body = 0; body < mechanism.bodies(); ++body) {
+    const Eigen::Matrix<double, 13, 1> values = body_row(mechanism, body, at);
+    row.insert(row.end(), values.begin(), values.end());
+  }
+  return row;
+}
+
 Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Trajectory& trajectory) {
   trajectory.columns = trajectory_columns(scene);
   Sampling sampling;
   sampling.times = output_times(scene.simulation);
   sampling.observe = [&mechanism, &trajectory](std::size_t, const StatePoint& at) {
-    std::vector<double> row{at.t};
-    row.reserve(trajectory.columns.size());
-    for (int body = 0; body < mechanism.bodies(); ++body) {
-      const Eigen::Matrix<double, 13, 1> values = body_row(mechanism, body, at);
-      row.insert(row.end(), values.begin(), values.end());
-    }
+    std::vector<double> row = body_columns(mechanism, at);
     for (int sensor = 0; sensor < mechanism.sensors(); ++sensor) row.push_back(mechanism.sensor_value(sensor, at));
     trajectory.rows.push_back(std::move(row));
   };

@@ -22,6 +22,9 @@ struct Trajectory {
 
 std::vector<std::string> trajectory_columns(const Scene& scene);
 
+// t and the columns of the bodies at one instant.
+std::vector<double> body_columns(const Mechanism& mechanism, const StatePoint& at);
+
 // A Sampling that appends a row to the trajectory at each output time. Both arguments must outlive it.
 Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Trajectory& trajectory);
 
