@@ -3,6 +3,7 @@
 #include "app/json/edit_text.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/run/run.hpp"
+#include "core/scene/vocabulary.hpp"
 
 namespace mbsopt {
 namespace {
@@ -14,65 +15,61 @@ std::string text_of(const Json& object) {
   return "{" + text + "}";
 }
 
-Json options_json(const IntegratorOptions& o) {
+// A visitor of the vocabulary: writes the fields of settings as in a problem file. An absent field is left out.
+class SettingsWriter {
+ public:
   Json json = Json::object();
-  if (o.min_step) json["min_step"] = *o.min_step;
-  if (o.newton_tolerance) json["newton_tolerance"] = *o.newton_tolerance;
-  if (o.newton_iterations) json["newton_iterations"] = *o.newton_iterations;
-  if (o.factor_min) json["factor_min"] = *o.factor_min;
-  if (o.factor_max) json["factor_max"] = *o.factor_max;
-  if (o.safety) json["safety"] = *o.safety;
-  if (!o.controller.empty()) json["controller"] = o.controller;
-  return json;
-}
 
-// The tolerance in the form of a problem file; kinds have the same scale.
-Json tolerance_json(double smallest, const std::optional<KindTolerances>& kinds) {
-  if (!kinds) return smallest;
-  Json json = Json::object();
-  const double scale = smallest / kinds->smallest();
-  const auto put = [&](const char* key, const std::optional<double>& value) {
-    if (value) json[key] = scale * *value;
-  };
-  put("position", kinds->position), put("angle", kinds->angle);
-  put("velocity", kinds->velocity), put("rate", kinds->rate);
-  for (const auto& [name, value] : kinds->bodies) json["bodies"][name] = scale * value;
-  return json;
-}
+  void plain(std::string_view key, const auto& value, const Range&, const Says&) { put(key, value); }
+  template <class T>
+  void plain(std::string_view key, const std::optional<T>& value, const Range&, const Says&) {
+    if (value) put(key, *value);
+  }
+  void word(std::string_view key, const std::string& value, const Words&, const Says&) {
+    if (!value.empty()) put(key, value);
+  }
+  void choice(std::string_view key, const auto& value, const auto& choices, const Says&) {
+    for (const auto& choice : choices)
+      if (choice.value == value) put(key, choice.word);
+  }
+  // The kinds have the same scale as the smallest tolerance.
+  void tolerance(std::string_view key, double smallest, const std::optional<KindTolerances>& given, const Says& says) {
+    if (!given) return put(key, smallest);
+    KindTolerances kinds = *given;
+    const double scale = smallest / kinds.smallest();
+    for (std::optional<double>* const kind : {&kinds.position, &kinds.angle, &kinds.velocity, &kinds.rate})
+      if (*kind) **kind *= scale;
+    for (auto& [body, value] : kinds.bodies) value *= scale;
+    object(key, std::as_const(kinds), says);
+  }
+  void values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, To, const Range&,
+                 const Says&) {
+    for (const auto& [name, value] : values) json[std::string(key)][name] = value;
+  }
+  void object(std::string_view key, const auto& settings, const Says&) {
+    SettingsWriter inside;
+    describe(inside, settings);
+    if (!inside.json.empty()) put(key, inside.json);
+  }
+  void misplaced(std::string_view, std::string_view) {}
+
+ private:
+  void put(std::string_view key, const auto& value) { json[std::string(key)] = value; }
+};
 
 Json integrator_json(const IntegratorSettings& s) {
-  Json json{{"type", s.type}};
-  if (s.step) {
-    json["step"] = *s.step;
-  } else {
-    json["rtol"] = tolerance_json(s.rtol, s.rtol_of), json["atol"] = tolerance_json(s.atol, s.atol_of);
-  }
-  if (s.initial_step) json["initial_step"] = *s.initial_step;
-  if (s.max_step) json["max_step"] = *s.max_step;
-  if (s.max_steps != IntegratorSettings{}.max_steps) json["max_steps"] = s.max_steps;
-  if (const Json options = options_json(s.options); !options.empty()) json["options"] = options;
-  return json;
+  SettingsWriter writer;
+  describe(writer, s);
+  if (s.step) writer.json.erase("rtol"), writer.json.erase("atol");
+  if (s.max_steps == IntegratorSettings{}.max_steps) writer.json.erase("max_steps");
+  return writer.json;
 }
 
 Json formulation_json(const FormulationSettings& f) {
-  const auto projection = f.projection == Projection::none       ? "none"
-                          : f.projection == Projection::velocity ? "velocity"
-                                                                 : "position_velocity";
-  if (f.type == FormulationType::penalty) {
-    return {{"type", "penalty"},
-            {"alpha", f.alpha},
-            {"xi", f.xi},
-            {"omega", f.omega},
-            {"projection", projection},
-            {"linear_solver", f.linear_solver == LinearSolver::cholesky ? "cholesky" : "quasidefinite"}};
-  }
-  return {{"type", "augmented_lagrangian"},
-          {"alpha", f.alpha},
-          {"xi", f.xi},
-          {"omega", f.omega},
-          {"iterations", f.iterations},
-          {"tolerance", f.tolerance},
-          {"projection", projection}};
+  SettingsWriter writer;
+  describe(writer, f);
+  if (f.type == FormulationType::penalty) writer.json.erase("iterations"), writer.json.erase("tolerance");
+  return writer.json;
 }
 
 }  // namespace
