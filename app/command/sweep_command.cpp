@@ -55,30 +55,25 @@ void add_ranges(Run& run, const SweepPoints& points, const std::vector<SweepRow>
   const ObjectiveUnits units = objective_units(run.problem);
   for (std::size_t o = 0; o < run.problem.objectives.size(); ++o) {
     const ObjectiveSpec& spec = run.problem.objectives[o];
-    const auto judged = [&](const SweepRow& row) -> std::optional<double> {
-      if (row.psi.size() == 0) return {};
-      return spec.is_extreme() ? row.true_values[o] : row.psi(static_cast<Eigen::Index>(o));
-    };
-    const SweepRow* least = nullptr;
-    const SweepRow* largest = nullptr;
-    for (const SweepRow& row : rows) {
-      const std::optional<double> value = judged(row);
-      if (!value) continue;
-      if (!least || *value < *judged(*least)) least = &row;
-      if (!largest || *value > *judged(*largest)) largest = &row;
+    std::vector<std::pair<double, std::size_t>> judged;  // values with the numbers of their points
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      if (rows[i].psi.size() == 0) continue;
+      const std::optional<double> value =
+          spec.is_extreme() ? rows[i].true_values[o] : rows[i].psi(static_cast<Eigen::Index>(o));
+      if (value) judged.emplace_back(*value, i + 1);
     }
-    if (!least) continue;
-    const auto number = [&](const SweepRow* row) { return static_cast<long>(row - rows.data()) + 1; };
+    if (judged.empty()) continue;
+    const auto [least, least_at] = *std::ranges::min_element(judged, {}, &std::pair<double, std::size_t>::first);
+    const auto [largest, largest_at] = *std::ranges::max_element(judged, {}, &std::pair<double, std::size_t>::first);
     Json& range = run.result["sweep"]["objectives"][spec.name];
     range = {{"of", spec.is_extreme() ? "true_value" : "value"},
-             {"least", *judged(*least)},
-             {"least_at", number(least)},
-             {"largest", *judged(*largest)},
-             {"largest_at", number(largest)}};
+             {"least", least},
+             {"least_at", least_at},
+             {"largest", largest},
+             {"largest_at", largest_at}};
     if (!units.at(spec.name).empty()) range["unit"] = units.at(spec.name);
-    table.add({spec.name + (spec.is_extreme() ? " (true)" : ""), shown_unit(units, spec.name),
-               significant(*judged(*least)), std::to_string(number(least)), significant(*judged(*largest)),
-               std::to_string(number(largest))});
+    table.add({spec.name + (spec.is_extreme() ? " (true)" : ""), shown_unit(units, spec.name), significant(least),
+               std::to_string(least_at), significant(largest), std::to_string(largest_at)});
   }
   run.context.out << fmt::format("{} points of {} parameter{}\n\n", rows.size(), points.parameters.size(),
                                  points.parameters.size() == 1 ? "" : "s");
