@@ -26,15 +26,6 @@
 namespace mbsopt {
 namespace {
 
-bool is_known(const std::string& word) {
-  const std::vector<std::string> names = command_names();
-  return word.starts_with('-') || std::find(names.begin(), names.end(), word) != names.end();
-}
-
-std::string what_is_wrong_with(const std::string& word) {
-  return fmt::format("there is no command '{}'{}", word, did_you_mean(word, command_names()));
-}
-
 // "help" is --help, "help design" is design --help.
 std::vector<std::string> without_help_command(std::vector<std::string> arguments) {
   if (arguments.empty() || arguments[0] != "help") return arguments;
@@ -139,8 +130,10 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
                      Ranks* ranks, const NamedTerms& terms) {
   const InterruptGuard guard;
   const std::vector<std::string> arguments = without_help_command(given);
-  if (!arguments.empty() && !is_known(arguments[0])) {
-    err << fmt::format("mbsopt: {}; available: {}\n", what_is_wrong_with(arguments[0]), joined(command_names()));
+  const std::vector<std::string> names = command_names();
+  if (!arguments.empty() && !arguments[0].starts_with('-') && std::ranges::find(names, arguments[0]) == names.end()) {
+    err << fmt::format("mbsopt: there is no command '{}'{}; available: {}\n", arguments[0],
+                       did_you_mean(arguments[0], names), joined(names));
     return kBadInput;
   }
   CLI::App app("Optimal design and parameter identification of mechanisms.", "mbsopt");

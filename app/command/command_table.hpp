@@ -17,7 +17,7 @@ namespace mbsopt {
 struct Command {
   std::string_view name;
   std::string_view does;
-  int (*run)(const CommandContext&);
+  CommandFunction* run;
   void (*add_options)(CLI::App& sub, CommandOptions& options);
   std::string_view example;  // the part after "mbsopt NAME"
 };

@@ -60,20 +60,11 @@ struct CommandContext {
   mutable std::shared_ptr<const ProblemSource> source = nullptr;  // once Run has read the problem
 };
 
-int validate_command(const CommandContext& context);
-int simulate_command(const CommandContext& context);
-int kinematics_command(const CommandContext& context);
-int linearise_command(const CommandContext& context);
-int gradient_command(const CommandContext& context);
-int check_command(const CommandContext& context);
-int design_command(const CommandContext& context);
-int identify_command(const CommandContext& context);
-int tradeoff_command(const CommandContext& context);
-int sweep_command(const CommandContext& context);
-int resume_command(const CommandContext& context);  // options.problem_file: the folder
-int new_command(const CommandContext& context);
-int import_command(const CommandContext& context);  // options.problem_file: the model
-int schema_command(const CommandContext& context);
-int completion_command(const CommandContext& context);
+using CommandFunction = int(const CommandContext& context);  // returns the exit code
+CommandFunction validate_command, simulate_command, kinematics_command, linearise_command, gradient_command;
+CommandFunction check_command, design_command, identify_command, tradeoff_command, sweep_command;
+CommandFunction resume_command;  // options.problem_file: the folder
+CommandFunction import_command;  // options.problem_file: the model
+CommandFunction new_command, schema_command, completion_command;
 
 }  // namespace mbsopt
