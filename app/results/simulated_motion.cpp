@@ -19,14 +19,6 @@
 namespace mbsopt {
 namespace {
 
-// Per objective, g of a sum or x of a mean or extreme; null if there is none.
-std::vector<std::shared_ptr<const PointCost>> running_terms(const std::vector<Objective>& objectives,
-                                                            const Mechanism& mechanism) {
-  std::vector<std::shared_ptr<const PointCost>> terms;
-  for (const Objective& o : objectives) terms.push_back(o.expression(mechanism));
-  return terms;
-}
-
 std::vector<std::vector<double>> instants_of(const std::vector<Objective>& objectives, const Mechanism& mechanism,
                                              const std::function<bool(double t)>& progress) {
   std::vector<std::vector<double>> instants(objectives.size());
@@ -77,12 +69,14 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   add_model(mechanism, settings, motion.model);
   motion.warnings = model_warnings(mechanism, assembly);
 
-  const std::vector<std::shared_ptr<const PointCost>> terms = running_terms(objectives, mechanism);
   motion.running.columns = {"t"};
-  for (const Objective& objective : objectives) motion.running.columns.push_back(objective.name());
-
+  std::vector<std::shared_ptr<const PointCost>> terms;  // g of a sum or x of a mean or extreme; null if there is none
   std::vector<const Objective*> all;
-  for (const Objective& objective : objectives) all.push_back(&objective);
+  for (const Objective& objective : objectives) {
+    motion.running.columns.push_back(objective.name());
+    terms.push_back(objective.expression(mechanism));
+    all.push_back(&objective);
+  }
   RunOptions options;
   options.progress = run.watched("simulating");
   const ObjectiveRun::Sweep recorded = [&](std::span<const Cost> costs) {
