@@ -207,10 +207,7 @@ int check_command(const CommandContext& context) {
 
   double last_good_time = scene.simulation.start_time;
   GradientCheckOptions options;
-  options.simulation_progress = [&, show = run.watched("simulating")](double t) {
-    last_good_time = t;
-    return show(t);
-  };
+  options.simulation_progress = run.watched("simulating", &last_good_time);
   options.progress = [&](int done, int of) { run.progress.fraction("checking", static_cast<double>(done) / of); };
   std::vector<std::string> left_out;
   const Problem needed = what_objectives_need(run.problem, &left_out);

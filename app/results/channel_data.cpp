@@ -92,24 +92,13 @@ void add_residuals(std::vector<ChannelData>& channels, const Problem& problem, c
 
 std::string channel_table(const std::vector<ChannelData>& channels) {
   const bool simulated = std::ranges::any_of(channels, [](const auto& c) { return !std::isnan(c.rms_scaled); });
-  std::vector<std::string> header{"experiment",  "channel", "samples", "missing", "rate",
-                                  "largest gap", "least",   "most",    "unit"};
-  if (simulated) header.push_back("rms/sigma at the start");
-  TextTable table(std::move(header));
-  for (const ChannelData& c : channels) {
-    std::vector<std::string> row{c.experiment,
-                                 c.column,
-                                 std::to_string(c.samples),
-                                 std::to_string(c.missing),
-                                 c.interval > 0 ? significant(1 / c.interval, 3) + " Hz" : "-",
-                                 significant(c.gap, 3) + " s",
-                                 significant(c.least, 4),
-                                 significant(c.most, 4),
-                                 c.unit};
-    if (simulated) row.push_back(significant(c.rms_scaled, 4));
-    table.add(std::move(row));
-  }
-  return table.text();
+  TextTable table({"experiment", "channel", "samples", "missing", "rate", "largest gap", "least", "most", "unit",
+                   "rms/sigma at the start"});
+  for (const ChannelData& c : channels)
+    table.add({c.experiment, c.column, std::to_string(c.samples), std::to_string(c.missing),
+               c.interval > 0 ? significant(1 / c.interval, 3) + " Hz" : "-", significant(c.gap, 3) + " s",
+               significant(c.least, 4), significant(c.most, 4), c.unit, simulated ? significant(c.rms_scaled, 4) : ""});
+  return table.text({"rms/sigma at the start"});
 }
 
 Json to_json(const std::vector<ChannelData>& channels) {

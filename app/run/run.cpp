@@ -149,9 +149,10 @@ void Run::write(const std::string& file, std::string_view content) {
   written_.push_back(file);
 }
 
-std::function<bool(double t)> Run::watched(std::string doing) {
+std::function<bool(double t)> Run::watched(std::string doing, double* last) {
   const double start = problem_.scene.simulation.start_time, end = problem_.scene.simulation.end_time;
-  return [this, doing = std::move(doing), start, end](double t) {
+  return [this, doing = std::move(doing), start, end, last](double t) {
+    if (last) *last = t;
     progress.fraction(doing, (t - start) / (end - start));
     return !interrupted();
   };

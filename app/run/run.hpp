@@ -48,8 +48,9 @@ class Run {
 
   void start();  // claims the folder: locks it, and writes result.json with "status": "running"
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
-  // Simulations call this after each step. It shows their progress, and returns false once the run is interrupted.
-  std::function<bool(double t)> watched(std::string doing);
+  // Simulations call this after each step. It shows their progress, and returns false once the run is interrupted. It
+  // keeps its last argument in *last.
+  std::function<bool(double t)> watched(std::string doing, double* last = nullptr);
   void warn(const std::string& words);  // "simulation.accuracy: ...": with the path's place in the file before them
   void warn(const std::vector<std::string>& all);
   // Replaces the settings of the file (accuracy_results.hpp).
