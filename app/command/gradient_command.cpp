@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
-#include "app/results/hessian_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/run/command.hpp"
@@ -14,6 +15,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/cvodes/cvodes.hpp"
+#include "core/expression/counted.hpp"
 #include "optim/objective/evaluator.hpp"
 #include "optim/objective/gradient_doubts.hpp"
 #include "optim/objective/hessian.hpp"
@@ -53,10 +55,73 @@ void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<st
   run.context.out << '\n' << table.text();
 }
 
+constexpr Eigen::Index kColumns = 6;   // of a table
+constexpr double kPoorlyKnown = 1e-4;  // of the largest entry, or of the gradient where that is larger
+
+std::string entry_text(double value, double error) { return std::abs(value) <= error ? "0" : significant(value, 6); }
+
+bool hides_entries(const ObjectiveHessian& H) {
+  return ((H.value.array() != 0) && (H.value.array().abs() <= H.error.array())).any();
+}
+
+std::string accuracy(const ObjectiveHessian& H) {
+  if (H.largest_error == 0) return "exact";
+  if (H.largest_entry <= H.largest_error) return "zero, as far as differences can tell";
+  return fmt::format("estimated error {:.1e} of the largest entry{}", H.relative(),
+                     hides_entries(H) ? "; entries within their own error are shown as 0" : "");
+}
+
+// The lower triangle.
+void print_hessian(std::ostream& out, const ObjectiveHessian& H, const std::string& objective,
+                   const std::vector<std::string>& parameters) {
+  const auto n = static_cast<Eigen::Index>(parameters.size());
+  out << fmt::format("\n{}: {}\n", objective, accuracy(H));
+  for (Eigen::Index first = 0; first < n; first += kColumns) {
+    const Eigen::Index end = std::min(first + kColumns, n);
+    std::vector<std::string> header{"d2 " + objective};
+    header.insert(header.end(), parameters.begin() + first, parameters.begin() + end);
+    TextTable table(header);
+    for (Eigen::Index p = first; p < n; ++p) {
+      std::vector<std::string> row{parameters[static_cast<std::size_t>(p)]};
+      for (Eigen::Index q = first; q < std::min(end, p + 1); ++q)
+        row.push_back(entry_text(H.value(p, q), H.error(p, q)));
+      table.add(std::move(row));
+    }
+    out << table.text();
+  }
+}
+
+// Second derivatives: into result.json, and as tables. Warns of those that differences did not determine well.
+void add_hessians(Run& run, const Hessians& hessians) {
+  const std::vector<std::string> parameters = names_of(run.problem.scene.parameters);
+  const std::string method(hessian_method(hessians.method));
+  run.result["methods"]["hessian"] = {{"wall_seconds", hessians.wall_seconds}, {"gradients", hessians.gradients}};
+  run.result["hessian_method"] = method;
+  run.context.out << fmt::format("\nsecond derivatives by {}: {}, {:.3g} s\n", method,
+                                 counted(hessians.gradients, "gradient"), hessians.wall_seconds);
+  for (std::size_t i = 0; i < hessians.of.size(); ++i) {
+    const ObjectiveHessian& H = hessians.of[i];
+    const std::string& name = run.problem.objectives[i].name;
+    Json& objective = run.result["objectives"][name];
+    objective["hessian"] = Json::object();
+    for (std::size_t p = 0; p < parameters.size(); ++p)
+      objective["hessian"][parameters[p]] = by_name(parameters, H.value.row(static_cast<Eigen::Index>(p)));
+    objective["hessian_error"] = H.relative();
+    print_hessian(run.context.out, H, name, parameters);
+  }
+  for (std::size_t i = 0; i < hessians.of.size(); ++i) {
+    const ObjectiveHessian& H = hessians.of[i];
+    const double size = std::max(H.largest_entry, H.gradient);
+    if (H.largest_error <= kPoorlyKnown * size) continue;
+    run.warn(
+        fmt::format("the second derivatives of '{}' are known to {:.1g} of the largest only: differences at different "
+                    "steps do not agree; is it smooth here (abs, min, max)?",
+                    run.problem.objectives[i].name, H.largest_error / size));
+  }
+}
+
 // The gradients are complete and stay, even if this fails.
 void add_second_derivatives(Run& run, Evaluator& evaluator) {
-  const std::vector<std::string> objectives = names_of(run.problem.objectives);
-  const std::vector<std::string> parameters = names_of(run.problem.scene.parameters);
   HessianOptions options;
   options.progress = [&](int done, int of) {
     run.progress.fraction("second derivatives", static_cast<double>(done) / of);
@@ -67,9 +132,7 @@ void add_second_derivatives(Run& run, Evaluator& evaluator) {
   if (interrupted() || !found.ok)
     return run.broke_off("the gradients are kept, there are no second derivatives",
                          "no second derivatives: " + found.message);
-  add_hessians(run.result, found, objectives, parameters);
-  print_hessians(run.context.out, found, objectives, parameters);
-  run.warn(hessian_warnings(found, objectives));
+  add_hessians(run, found);
 }
 
 }  // namespace
@@ -94,10 +157,7 @@ int gradient_command(const CommandContext& context) {
   double last_good_time = scene.simulation.start_time;
   EvaluatorOptions options;
   options.method = wanted;
-  options.progress = [&, show = run.watched("differentiating")](double t) {
-    last_good_time = t;
-    return show(t);
-  };
+  options.progress = run.watched("differentiating", &last_good_time);
   std::vector<std::string> left_out;
   const Problem needed = what_objectives_need(run.problem, &left_out);
   say_left_out(run, left_out, "objective");
