@@ -4,7 +4,6 @@
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/results/sensitivities_csv.hpp"
 #include "app/results/simulated_motion.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"

@@ -26,4 +26,12 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho);
 // Warns of each column with empty cells. Ctrl-C stops the run without the files.
 void write_trajectory(Run& run, const Trajectory& trajectory, const std::vector<SingularPosition>& singular);
 
+// Throws std::invalid_argument if the scene has no sensors or no parameters.
+void require_sensitivities(const Scene& scene);
+
+// sensitivities.csv: the tangent-linear model of the trajectory as a table, with a row per output time. Columns are t,
+// then per sensor and parameter  d SENSOR/d PARAMETER. These are total derivatives, with the dependence of the start.
+// A failed or stopped run leaves no file; the outcome of `run` gives the reason.
+void write_sensitivities(Run& run);
+
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-#include "app/results/trajectory_gnuplot.hpp"
+#include "app/results/trajectory_exports.hpp"
 
 #include <catch2/catch.hpp>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-#include "app/results/trajectory_mat.hpp"
+#include "app/results/trajectory_exports.hpp"
 
 #include <matio.h>
 
