@@ -107,7 +107,7 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"wall_seconds", design.wall_seconds},
                          {"objective_initial", design.objective_initial},
                          {"objective_final", design.objective_final},
-                         {"optimality", std::isfinite(design.optimality) ? Json(design.optimality) : Json()},
+                         {"optimality", design.optimality},
                          {"infeasibility", design.violation},
                          {"true_infeasibility", design.true_violation}};
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
@@ -179,12 +179,6 @@ Trajectory history_of(const DesignResult& design) {
   return history;
 }
 
-std::vector<NewValue> new_values(const DesignResult& design) {
-  std::vector<NewValue> values;
-  for (const DesignVariable& v : design.variables) values.push_back({"", v.name, v.value});
-  return values;
-}
-
 // If the linkage does not close at the values of the file, the design starts from values at which it does.
 void lead_to_closing(Run& run, SimulatedMotion& before) {
   DesignOptions options;
@@ -254,8 +248,10 @@ int design_command(const CommandContext& context) {
       run.result["objectives"][name]["instants"] = after.instants[i];
   }
   const Trajectory history = history_of(design);
+  std::vector<NewValue> values;
+  for (const DesignVariable& v : design.variables) values.push_back({"", v.name, v.value});
   run.write("optimized.json",
-            optimized_problem_text(run, new_values(design), design.mode ? design.mode->bodies : std::vector<Body>{}));
+            optimized_problem_text(run, values, design.mode ? design.mode->bodies : std::vector<Body>{}));
   run.write("history.csv", to_csv(history));
   if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory, after.simulation.statistics.singular);
   run.write("report.html",

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <map>
 
 #include "app/files/json_text.hpp"
@@ -31,21 +32,9 @@ Json json_of(const OrientationField& field) {
 
 std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values,
                                    const std::vector<Body>& poses) {
-  const CommandOptions& options = run.context.options;
-  std::string text = optimized_problem_text(options.problem_file, options.sets, run.problem, values, run.folder.path());
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const std::string body = child_path("bodies", i);
-    text = with_value(text, body + ".position", json_text(json_of(poses[i].position)));
-    text = with_value(text, body + ".orientation", json_text(json_of(poses[i].orientation)));
-  }
-  return text;
-}
-
-std::string optimized_problem_text(const std::string& problem_file, const std::vector<std::string>& sets,
-                                   const Problem& problem, const std::vector<NewValue>& values,
-                                   const std::filesystem::path& folder) {
-  std::string text = read_text_file(problem_file);
-  for (const std::string& set : sets) text = with_override(text, set);
+  const Problem& problem = run.problem;
+  std::string text = read_text_file(run.context.options.problem_file);
+  for (const std::string& set : run.context.options.sets) text = with_override(text, set);
   std::map<std::string, double> of_parameters;
   for (const NewValue& v : values) {
     if (v.experiment.empty()) of_parameters[v.parameter] = v.value;
@@ -63,8 +52,13 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
   for (const NamedFiles& named : named_files(problem)) {
     Json moved = Json::array();
     for (const std::string& file : named.files)
-      moved.push_back(std::filesystem::relative(file, std::filesystem::canonical(folder)).generic_string());
+      moved.push_back(std::filesystem::relative(file, std::filesystem::canonical(run.folder.path())).generic_string());
     text = with_value(text, named.path, json_text(named.is_list ? moved : moved[0]));
+  }
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::string body = child_path("bodies", i);
+    text = with_value(text, body + ".position", json_text(json_of(poses[i].position)));
+    text = with_value(text, body + ".orientation", json_text(json_of(poses[i].orientation)));
   }
   return text;
 }

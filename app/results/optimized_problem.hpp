@@ -2,7 +2,6 @@
 // in another folder: the paths of data files are rewritten. Comments and formatting stay.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -21,10 +20,5 @@ class Run;
 // poses are those of the scene's bodies, if they must be written, too.
 std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values,
                                    const std::vector<Body>& poses = {});
-
-// problem is that of the file with its --set options. folder is that of the text.
-std::string optimized_problem_text(const std::string& problem_file, const std::vector<std::string>& sets,
-                                   const Problem& problem, const std::vector<NewValue>& values,
-                                   const std::filesystem::path& folder);
 
 }  // namespace mbsopt

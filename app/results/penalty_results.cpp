@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "app/results/tradeoff_results.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
@@ -62,7 +60,6 @@ Json penalty_json(const PenaltyStudy& study) {
     json["errors"] = errors_json(quantities, r.errors);
     return json;
   };
-  const auto number_or_null = [](double value) { return std::isfinite(value) ? Json(value) : Json(); };
   Json json{{"integrator", study.integrator.type},
             {"rtol", study.integrator.rtol},
             {"atol", study.integrator.atol},
@@ -73,9 +70,9 @@ Json penalty_json(const PenaltyStudy& study) {
   for (const PenaltyStudyRow& row : study.rows) {
     json["rows"].push_back({{"alpha", row.alpha},
                             {"acceleration",
-                             {{"model_error", number_or_null(row.model_error)},
-                              {"rounding", number_or_null(row.rounding_error)},
-                              {"augmented_lagrangian", number_or_null(row.augmented_error)}}},
+                             {{"model_error", row.model_error},
+                              {"rounding", row.rounding_error},
+                              {"augmented_lagrangian", row.augmented_error}}},
                             {"quasidefinite", run_json(row.quasidefinite)},
                             {"cholesky", run_json(row.cholesky)},
                             {"rounding", errors_json(quantities, row.rounding)}});
