@@ -397,7 +397,8 @@ def equilibrium(lab):
 def depends_on_time(problem):
     laws = [problem.get("drives", []), [force.get("law", "") for force in problem.get("forces", [])],
             [force.get("components", []) for force in problem.get("forces", [])]]
-    return "t" in names_in(laws) or any(isinstance(drive["law"], dict) for drive in problem.get("drives", []))
+    of_time = {"t", *problem.get("signals", {})}
+    return bool(of_time & names_in(laws)) or any(isinstance(drive["law"], dict) for drive in problem.get("drives", []))
 
 
 def brief(lab):
