@@ -1,5 +1,5 @@
-# Installs the build to a folder of its own, then configures, builds and runs projects that use it: examples/, and one
-# that has a folder core/ of its own.
+# Installs the build to a folder of its own, then configures, builds and runs projects that use it: one that has a folder
+# core/ of its own, the one of docs/library.md, and examples/.
 set(work ${BUILD}/package_test)
 file(REMOVE_RECURSE ${work})
 execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${work}/prefix
@@ -8,6 +8,15 @@ execute_process(COMMAND ${CMAKE_COMMAND} -S ${SOURCE} -B ${work}/consumer -G ${G
                         -DCMAKE_PREFIX_PATH=${work}/prefix -DCMAKE_BUILD_TYPE=Release COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${CMAKE_COMMAND} --build ${work}/consumer COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${work}/consumer/consumer COMMAND_ERROR_IS_FATAL ANY)
+
+file(READ ${SOURCE}/../../docs/library.md page)
+string(REGEX MATCH "```cmake\n([^`]*)```.*```c\\+\\+\n([^`]*)```" found "${page}")
+file(WRITE ${work}/library/CMakeLists.txt "${CMAKE_MATCH_1}")
+file(WRITE ${work}/library/swing.cpp "${CMAKE_MATCH_2}")
+execute_process(COMMAND ${CMAKE_COMMAND} -S ${work}/library -B ${work}/library/build -G ${GENERATOR}
+                        -DCMAKE_PREFIX_PATH=${work}/prefix -DCMAKE_BUILD_TYPE=Release COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${CMAKE_COMMAND} --build ${work}/library/build COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${work}/library/build/swing COMMAND_ERROR_IS_FATAL ANY)
 
 file(GLOB headers ${work}/prefix/include/mbsopt/*.hpp)
 list(LENGTH headers count)
