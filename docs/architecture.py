@@ -56,7 +56,7 @@ def circles(includes):
 
 def stale_names():
     """The paths that pages and sources name, and that do not exist."""
-    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    pages = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
     tops = ("core", "optim", "app", "tests", "bench")
     sources = [path for top in tops for path in sorted((ROOT / top).rglob("*.[ch]pp"))]
     for page in pages + sources:
