@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/run/kinks.hpp"
 #include "core/run/timed_laws.hpp"
 
 namespace mbsopt {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/run/kinks.hpp"
+#include "core/run/timed_laws.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/start/model_warnings.hpp"
 #include "core/step/event_times.hpp"

@@ -2,9 +2,10 @@
 
 #include <utility>
 
+#include "core/expression/program_switches.hpp"
 #include "core/expression/time_parts.hpp"
 #include "core/force/forces.hpp"
-#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/kinks_in_time.hpp"
 
 namespace mbsopt {
 
@@ -37,6 +38,15 @@ std::vector<TimedLaw> timed_laws(const Mechanism& mechanism, std::span<const Cos
   for (const Cost& cost : costs)
     if (const SwitchedProgram* const g = cost.running ? cost.running->program() : nullptr) add(g->program, P, -1, -1);
   return laws;
+}
+
+std::vector<KinkedSignal> kinks_of(const Mechanism& mechanism, std::span<const Cost> costs) {
+  std::vector<KinkedSignal> kinks = mechanism.data().kinks;
+  const Eigen::VectorXd& rho = mechanism.data().rho;
+  for (const Cost& cost : costs)
+    if (const SwitchedProgram* const p = cost.running ? cost.running->program() : nullptr)
+      add_kinks_in_time(p->program, static_cast<int>(rho.size()), rho, kinks);
+  return kinks;
 }
 
 }  // namespace mbsopt

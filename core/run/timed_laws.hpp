@@ -1,5 +1,6 @@
 // The laws of drives (second derivatives, which move the forces) and forces, and the running costs, as far as they
-// depend on time and parameters alone, with the instants of a run at which they change (time_parts.hpp).
+// depend on time and parameters alone, with the instants of a run at which they change (time_parts.hpp), jump or have
+// kinks.
 #pragma once
 
 #include <span>
@@ -7,6 +8,7 @@
 
 #include "core/expression/program.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 #include "core/run/cost.hpp"
 
 namespace mbsopt {
@@ -22,5 +24,8 @@ struct TimedLaw {
 std::vector<double> timed_inputs(const Mechanism& mechanism);
 
 std::vector<TimedLaw> timed_laws(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end);
+
+// The samples of all laws and running costs.
+std::vector<KinkedSignal> kinks_of(const Mechanism& mechanism, std::span<const Cost> costs);
 
 }  // namespace mbsopt

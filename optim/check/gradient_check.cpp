@@ -9,7 +9,7 @@
 #include <set>
 
 #include "core/cvodes/cvodes.hpp"
-#include "core/run/kinks.hpp"
+#include "core/run/timed_laws.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "optim/check/rounding_scatter.hpp"
 #include "optim/check/taylor_remainders.hpp"
