@@ -194,20 +194,15 @@ class Search {
     return pair;
   }
 
-  // The exact one is a. If two differ, it is the one whose gradients change less by the last tightening.
+  // The exact one is a.
   void add_gradients(Candidate& a, Candidate& b, TradeoffReference& reference) {
     if (!runs_.has_gradients() || !options_.gradients) return;
-    constexpr double kSettledWell = 1e-10;
     Gradients best = closest_gradients(gradients_of(a), gradients_of(b));
     if (!best.answer.ok) return;
     reference.gradients_by = to_string(runs_.discrete_method());
     if (!a.method.step && !b.method.step) {
       shorten_steps(a.settings, b.settings, best);
-      if (step_evenly(best)) {
-        reference.gradients_by += " on even steps of gauss6 and radau5";
-      } else if (best.apart > kSettledWell && tightening(b, best.certificate) < tightening(a, best.answer)) {
-        std::swap(a, b), std::swap(best.answer, best.certificate);
-      }
+      if (step_evenly(best)) reference.gradients_by += " on even steps of gauss6 and radau5";
     }
     a.answer.psi_rho = std::move(best.answer.psi_rho), b.answer.psi_rho = std::move(best.certificate.psi_rho);
   }
@@ -216,14 +211,6 @@ class Search {
     RunLimit longer = limit("gradients");
     longer.seconds *= 4;
     return runs_.gradients(settings, runs_.discrete_method(), longer);
-  }
-
-  // The change of gradients by the last tightening of their tolerances.
-  double tightening(const Candidate& c, const Answer& now) const {
-    SimulationSettings looser = c.settings;
-    looser.integrator.rtol *= 10, looser.integrator.atol *= 10;
-    const Answer before = gradients_at(looser);
-    return before.ok ? gradients_apart(now, before) : kInfinity;
   }
 
   // Derivatives magnify the rounding of positions near singular ones, by how close stages come to them, which is
