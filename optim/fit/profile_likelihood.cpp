@@ -17,7 +17,7 @@ using Point = ParameterProfile::Point;
 constexpr int kMostPoints = 30;       // on each side
 constexpr double kProfileStep = 0.5;  // of tau, aimed at
 constexpr double kLongest = 4;        // a step against the one before
-constexpr double kBeyond = 1.15;      // of the quantile: so far the profile is drawn
+constexpr double kDrawnTo = 1.15;     // of the quantile: so far the profile is drawn
 constexpr double kCrossing = 1e-3;    // of the quantile
 constexpr int kSecants = 8;
 
@@ -37,7 +37,7 @@ class Side {
       if (!next) return;
       points.push_back(*next);
       if (std::abs(next->tau) >= options_.quantile && !crossing) find_crossing(last, *next);
-      if (stopped_ || std::abs(next->tau) >= kBeyond * options_.quantile) return;
+      if (stopped_ || std::abs(next->tau) >= kDrawnTo * options_.quantile) return;
       if (at_bound) {
         if (!crossing) end("the data do not exclude its bound");
         return;
