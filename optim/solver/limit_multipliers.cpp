@@ -117,9 +117,11 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
   LimitRound round(problem, c_lower, c_upper);
   LeastSquaresResult all;
   all.x = x_start;
+  LearntCurvature learnt(problem.variables());
   double tolerance = kLoosest, shown = 0;
   for (int k = 0; k < kLimitRounds; ++k, tolerance *= kTightening) {
     LeastSquaresOptions of_round = options;
+    of_round.large_residuals = true, of_round.learnt = &learnt;
     of_round.tolerance = std::max(kFinerLimits * options.tolerance, tolerance);
     of_round.max_iterations = options.max_iterations - all.iterations;
     if (options.max_evaluations) of_round.max_evaluations = std::max(1L, *options.max_evaluations - round.evaluations);

@@ -1,5 +1,5 @@
 // Nonlinear least squares within limits of further functions, c_lower <= c(x) <= c_upper, by the method of multipliers.
-// Each round is a Levenberg-Marquardt search:
+// Each round is a Levenberg-Marquardt search that learns the second-order term, since limits leave residuals large:
 //
 //   minimise 1/2 |z|^2 + 1/2 w^2 |s - P(s)|^2,   s = c + l/w^2,      then      l <- w^2 (s - P(s))
 //

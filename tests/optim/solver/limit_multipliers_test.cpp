@@ -1,8 +1,9 @@
 // Least squares within limits: published minima of Hock and Schittkowski, "Test Examples for Nonlinear Programming
-// Codes" (1981).
+// Codes" (1981), and of More, Garbow and Hillstrom, ACM Transactions on Mathematical Software 7 (1981) 17.
 #include "optim/solver/limit_multipliers.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <stdexcept>
@@ -36,6 +37,18 @@ Squares hs22() {
           }};
 }
 
+// Brown and Dennis: 20 residuals of which 85822.2 is left.
+Squares brown_and_dennis() {
+  return {4, 20, [](const VectorXd& x, VectorXd& z, MatrixXd& J) {
+            for (int i = 0; i < 20; ++i) {
+              const double t = (i + 1) / 5.0, a = x(0) + t * x(1) - std::exp(t),
+                           b = x(2) + std::sin(t) * x(3) - std::cos(t);
+              z(i) = a * a + b * b;
+              J.row(i) << 2 * a, 2 * a * t, 2 * b, 2 * b * std::sin(t);
+            }
+          }};
+}
+
 }  // namespace
 
 TEST_CASE("least squares within limits: a published minimum, from a point beyond them", "[limits]") {
@@ -66,6 +79,38 @@ TEST_CASE("least squares within limits: limits against each other are infeasible
       solve_within_limits(problem, vector({-kUnlimited, 1}), vector({-3, kUnlimited}), vector({0, 0}), options);
   INFO(found.message);
   CHECK(found.status == SolverStatus::infeasible);
+}
+
+TEST_CASE("large residuals: the learnt second-order term takes fewer evaluations to a published minimum", "[limits]") {
+  Squares plain = brown_and_dennis(), learnt = brown_and_dennis();
+  LeastSquaresOptions options;
+  options.tolerance = 1e-14, options.max_iterations = 1000;
+  const VectorXd start = vector({25, 5, -5, -1});
+  const LeastSquaresResult by_squares = solve_least_squares(plain, start, options);
+  options.large_residuals = true;
+  const LeastSquaresResult by_both = solve_least_squares(learnt, start, options);
+  CHECK(2 * by_both.cost_final == Approx(85822.2016).epsilon(1e-8));
+  const VectorXd gradient = by_both.point.z_x.transpose() * by_both.point.z;
+  CHECK(gradient.norm() < 1e-4 * by_both.point.z_x.norm() * by_both.point.z.norm());
+  INFO(learnt.calls << " of " << plain.calls);
+  CHECK(learnt.calls < plain.calls);
+  CHECK(by_squares.cost_final >= by_both.cost_final * (1 - 1e-10));
+}
+
+TEST_CASE("large residuals: what one search has learnt shortens the next", "[limits]") {
+  Squares problem = brown_and_dennis();
+  LearntCurvature learnt(4);
+  LeastSquaresOptions options;
+  options.large_residuals = true, options.tolerance = 1e-6, options.max_iterations = 1000;
+  options.learnt = &learnt;
+  const VectorXd reached = solve_least_squares(problem, vector({25, 5, -5, -1}), options).x;
+  options.tolerance = 1e-14;
+  const LeastSquaresResult next = solve_least_squares(problem, reached, options);
+  CHECK(2 * next.cost_final == Approx(85822.2016).epsilon(1e-8));
+  options.learnt = nullptr;
+  const LeastSquaresResult anew = solve_least_squares(problem, reached, options);
+  INFO(next.evaluations << " of " << anew.evaluations);
+  CHECK(next.evaluations < anew.evaluations);
 }
 
 TEST_CASE("least squares within limits: rounds end in front of points that fail", "[limits]") {
