@@ -315,7 +315,7 @@ def rounded(lab):
     if not runs[1].ok:
         return [] if lab.doubts(runs[1]) else [("rounded", f"{digits} digits end with: {runs[1].message[-300:]}")]
     worst, where = lab.apart(*(run.trajectory() for run in runs))
-    if worst > 1e3 * 10**-digits and certain(lab, worst) and not lab.doubts(*runs):
+    if worst > 1e3 * 10**-digits * lab.distance and certain(lab, worst) and not lab.doubts(*runs):
         return [("rounded", f"{digits} digits and all of them, {where}: {worst:.1e} apart")]
     return []
 
