@@ -66,6 +66,8 @@ class Outcome:
 
     def look(self):
         """What is wrong with any run, whatever it computes."""
+        if self.interrupted and self.code == -signal.SIGINT and not (self.folder / "journal.jsonl").exists():
+            return  # it had not begun
         if self.code < 0:
             self.complain("signal", f"died by signal {-self.code} ({signal.Signals(-self.code).name})")
             return
