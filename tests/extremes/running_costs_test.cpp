@@ -93,24 +93,27 @@ TEST_CASE("a running cost that grows without bounds but has an integral is no po
 TEST_CASE("a running cost that the steps do not resolve is a warning with its name, the error and what to change",
           "[extremes]") {
   const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "radau5", "sdirk4");
-  for (const char* g : {"sin(1000*t)^2", "1/((t - 0.50123 + 1e-9*theta)^2 + 1e-8)"}) {
+  for (const char* g : {"sin(1000*t + 1e-9*theta)^2", "1/((t - 0.50123 + 1e-9*theta)^2 + 1e-8)"}) {
     INFO(method << ", " << g);
     CHECK_THAT(warnings_of(judged(g, method)), Contains("do not resolve the running cost of objective 'judged'") &&
                                                    Contains("estimated error of") && Contains("max_step"));
   }
 }
 
-TEST_CASE("a peak of time alone is right, or a warning where stages notice it", "[extremes]") {
+TEST_CASE("a peak of time alone is right, or a warning where few stages notice its feet", "[extremes]") {
   const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "radau5", "sdirk4");
   const double top = GENERATE(0.31, 0.50123);
-  const Json p = judged(fmt::format("1/((t - {})^2 + 1e-8)", top), method);
+  const bool has_feet = GENERATE(true, false);
+  const Json p = judged(
+      has_feet ? fmt::format("1/((t - {})^2 + 1e-8)", top) : fmt::format("1e4*exp(-(1e4*(t - {}))^2)", top), method);
+  const double exact =
+      has_feet ? 1e4 * (std::atan(1e4 * (1 - top)) + std::atan(1e4 * top)) : std::sqrt(std::numbers::pi);
   const Outcome run = values(p);
   REQUIRE(run.ok());
-  INFO(method << ", " << top << ": " << run("judged"));
-  const double exact = 1e4 * (std::atan(1e4 * (1 - top)) + std::atan(1e4 * top));
-  CHECK(std::abs(run("judged") - exact) < (method == "sdirk4" ? 5e-2 : 2e-4) * exact);
-  const bool is_right = std::abs(run("judged") - exact) < 1e-3 * exact;
-  CHECK((is_right || warnings_of(p).find("do not resolve the running cost") != std::string::npos));
+  INFO(method << ", " << top << ": " << run("judged") << " for " << exact);
+  if (method == "dopri853" || method == "dopri5") CHECK(run("judged") == Approx(exact).epsilon(2e-3));
+  CHECK((std::abs(run("judged") - exact) < 2e-3 * exact ||
+         warnings_of(p).find("do not resolve the running cost") != std::string::npos));
 }
 
 TEST_CASE("a resolved running cost is none, and its error is less than twice the estimate", "[extremes]") {
