@@ -35,7 +35,7 @@ void add_keep_journal(CLI::App& sub, CommandOptions& options) {
   sub.add_flag("--keep-journal", options.keep_journal, "keep journal.jsonl after a successful run");
 }
 
-// Of every command that reads a problem file.
+// Adds the options of every command that reads a problem file.
 void problem_options(CLI::App& sub, CommandOptions& options) {
   add_run_options(sub, options);
   sub.add_option("problem", options.problem_file, "problem file (*.json)")->required();

@@ -19,7 +19,8 @@ namespace mbsopt {
 
 // The others, without one group.
 struct OthersWithout {
-  // Of each variable x, 0 for those that are not shared. Infinite if the others and priors do not determine it.
+  // One per variable x: it is 0 for those that are not shared, and infinite if the others and priors do not determine
+  // it.
   Eigen::VectorXd change;
   // Weighted squares of their samples: at the solution, and least ones, to first order and whatever the bounds.
   Eigen::Index samples = 0;

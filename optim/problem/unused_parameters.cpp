@@ -160,7 +160,8 @@ class ConnectedBodies {
   std::unordered_map<std::string, std::size_t> index_;
 };
 
-// What the objectives and measurements of a problem depend on. Without any, a sensor of everything takes their place.
+// Collects what the objectives and measurements of a problem depend on. Without any, a sensor of everything replaces
+// them.
 class Reach {
  public:
   explicit Reach(const Problem& problem) : scene_(problem.scene), search_(scene_), bodies_(scene_.bodies) {

@@ -1,4 +1,4 @@
-// What the studies of a trade-off share: they find the reference, measure rows, and time them again. A study chooses
+// The studies of a trade-off share this: they find the reference, measure rows, and time them again. A study chooses
 // the settings.
 #pragma once
 

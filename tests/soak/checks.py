@@ -457,8 +457,8 @@ def interrupted(lab):
     points = ("--threads", "1", "--vary", f"{name}={value - size!r}:{value + size!r}:12")
     design = {"minimize": sorted(lab.problem["objectives"])[0], "variables": [name],
               "optimizer": {"max_iterations": 2, "max_evaluations": 4}, "multistart": {"starts": 5, "seed": 3}}
-    lab.variant("starts", lab.problem | {
-        "design": design, "parameters": parameters | {name: {"value": value, "lower": value - size, "upper": value + size}}})
+    bounded = parameters | {name: {"value": value, "lower": value - size, "upper": value + size}}
+    lab.variant("starts", lab.problem | {"design": design, "parameters": bounded})
 
     def rows(run):
         table = run.folder / "sweep.csv"
