@@ -10,6 +10,8 @@
 namespace mbsopt {
 namespace {
 
+constexpr int kMostDense = 60;  // bodies: within a second
+
 using Eigen::Index;
 using Eigen::MatrixXd;
 using OfBody = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 7>;  // no body has more columns
@@ -62,27 +64,34 @@ class Front {
 
   RowMajor& rows() { return X_; }
 
-  // Finds rows whose part in the columns [first, first + count) is independent of earlier ones, and clears it in the
-  // others.
+  // Finds rows whose part in the columns [first, first + count) is independent of others, and clears it in the rest.
+  // They are those that are independent of earlier ones, but small parts come after large ones.
   std::vector<bool> pivots(Index first, Index count) {
     std::vector<bool> is_pivot(static_cast<std::size_t>(X_.rows()), false);
     found_.resize(0);
-    for (Index i = 0; i < X_.rows(); ++i) {
-      const double size = std::max(1.0, X_.row(i).norm());
-      for (int twice = 0; twice < 2; ++twice) {
-        for (const Index k : found_) {
-          const double along = X_.row(i).segment(first, count).dot(X_.row(k).segment(first, count));
-          X_.row(i) -= along * X_.row(k);
+    for (const double least : {std::max(kLarge, threshold_), threshold_}) {
+      for (Index i = 0; i < X_.rows(); ++i) {
+        if (is_pivot[static_cast<std::size_t>(i)]) continue;
+        const double size = std::max(1.0, X_.row(i).norm());
+        for (int twice = 0; twice < 2; ++twice) {
+          for (const Index k : found_) {
+            const double along = X_.row(i).segment(first, count).dot(X_.row(k).segment(first, count));
+            X_.row(i) -= along * X_.row(k);
+          }
         }
+        const double left = X_.row(i).segment(first, count).norm();
+        if (!(left > least * size) || static_cast<Index>(found_.size()) == count) continue;
+        magnifies_ = magnifies_ || left < kLarge * size;
+        X_.row(i) /= left;
+        found_.push_back(i);
+        is_pivot[static_cast<std::size_t>(i)] = true;
       }
-      const double left = X_.row(i).segment(first, count).norm();
-      if (!(left > threshold_ * size) || static_cast<Index>(found_.size()) == count) continue;
-      X_.row(i) /= left;
-      found_.push_back(i);
-      is_pivot[static_cast<std::size_t>(i)] = true;
     }
     return is_pivot;
   }
+
+  // Returns whether a pivot row has so small a part that it magnifies the rounding of the rest beyond the threshold.
+  bool magnifies() const { return magnifies_; }
 
   // Returns a column for each direction that the pivots' parts do not span: the column with the largest component.
   std::vector<int> unreached(Index first, Index count) const {
@@ -102,10 +111,26 @@ class Front {
   }
 
  private:
+  static constexpr double kLarge = 1e-4;  // rounding over it, body after body, is below the thresholds of ranks, 1e-8
+
   RowMajor X_;
   double threshold_;
+  bool magnifies_ = false;
   std::vector<Index> found_;
 };
+
+// All bodies at once, without a part to divide by.
+RowDependence dense_row_dependence(int bodies, int width, const std::vector<Row>& rows, double threshold) {
+  const Index columns = static_cast<Index>(width) * bodies;
+  Front front(rows.size(), columns, threshold);
+  for (const Row& row : rows)
+    for (const Part& part : row.parts) front.rows().row(row.number).segment(width * part.position, width) = part.x;
+  RowDependence result;
+  result.independent = front.pivots(0, columns);
+  result.rank = static_cast<int>(std::ranges::count(result.independent, true));
+  for (const int column : front.unreached(0, columns)) result.unreached.push_back({column / width, column % width});
+  return result;
+}
 
 }  // namespace
 
@@ -149,6 +174,8 @@ RowDependence row_dependence(int rows, int bodies, int width, std::span<const Sp
     for (std::size_t i = 0; i < rest.size(); ++i)
       next.rows().row(static_cast<Index>(i)) = front.rows().row(rest[i]).tail(passed_on);
     const std::vector<bool> goes_on = next.pivots(0, passed_on);
+    if ((front.magnifies() || next.magnifies()) && bodies <= kMostDense)
+      return dense_row_dependence(bodies, width, rows_of(rows, width, J), threshold);
     for (std::size_t i = 0; i < rest.size(); ++i) {
       if (!goes_on[i]) continue;
       Row row{here[static_cast<std::size_t>(rest[i])].number, {}};
@@ -159,7 +186,7 @@ RowDependence row_dependence(int rows, int bodies, int width, std::span<const Sp
       waiting[at(others.front().row)].push_back(std::move(row));
     }
   }
-  for (const bool independent : result.independent) result.rank += independent ? 1 : 0;
+  result.rank = static_cast<int>(std::ranges::count(result.independent, true));
   return result;
 }
 

@@ -10,6 +10,9 @@
 // of it is. Another row is reduced by the pivot rows before it. It is independent of the reduced rows before it if and
 // only if the row itself is independent (contraction of a matroid: Oxley, "Matroid Theory" (2011), section 3.1). A row
 // that depends on earlier ones at its own front alone is dropped there. So no front passes on more rows than columns.
+//
+// A pivot row with a small part magnifies rounding, as of axes that are parallel but for 1e-8. Then all bodies form one
+// front, if they are few.
 #pragma once
 
 #include <span>

@@ -1,5 +1,6 @@
 #include "core/linear/row_dependence.hpp"
 
+#include <Eigen/SVD>
 #include <catch2/catch.hpp>
 #include <random>
 
@@ -32,8 +33,9 @@ struct SparseRows {
   }
 };
 
-// Rows on one to three bodies each. Every third row is a sum of earlier ones, some rows are zero, some repeat.
-SparseRows arbitrary_rows(Random& random) {
+// Rows on one to three bodies each. Every third row is a sum of earlier ones, some rows are zero, some repeat. `small`
+// multiplies every third part of a row.
+SparseRows arbitrary_rows(Random& random, double small = 1) {
   SparseRows J{0, 1 + below(9, random), 2 + below(6, random), {}};
   J.rows = below(3 * J.bodies * J.width / 2 + 1, random);
   MatrixXd all = MatrixXd::Zero(J.rows, J.bodies * J.width);
@@ -46,7 +48,9 @@ SparseRows arbitrary_rows(Random& random) {
       const int parts = 1 + below(3, random);
       for (int k = 0; k < parts; ++k) {
         const int body = below(J.bodies, random);
-        for (int c = 0; c < J.width; ++c) all(i, J.width * body + c) += below(3, random) == 0 ? 0 : normal(random);
+        const double size = small == 1 || below(3, random) > 0 ? 1 : small;
+        for (int c = 0; c < J.width; ++c)
+          all(i, J.width * body + c) += below(3, random) == 0 ? 0 : size * normal(random);
       }
     }
     for (int c = 0; c < all.cols(); ++c)
@@ -110,6 +114,24 @@ TEST_CASE("rows found independent are those that Gram-Schmidt on whole rows find
     REQUIRE(found.rank == std::count(found.independent.begin(), found.independent.end(), true));
     REQUIRE(static_cast<int>(found.unreached.size()) == J.bodies * J.width - found.rank);
   }
+}
+
+TEST_CASE("parts of rows that are nearly zero do not hide dependence", "[row_dependence]") {
+  Random random(2);
+  int clear = 0;
+  for (int sample = 0; sample < 1500; ++sample) {
+    const SparseRows J = arbitrary_rows(random, 3e-8);
+    if (J.rows == 0) continue;
+    MatrixXd dense = J.dense();
+    for (auto row : dense.rowwise())
+      if (row.norm() > 0) row.normalize();
+    const Eigen::VectorXd s = Eigen::JacobiSVD<MatrixXd>(dense).singularValues();
+    if (((s.array() > 1e-12) && (s.array() < 1e-3)).any()) continue;
+    ++clear;
+    INFO(sample << ": " << J.rows << " rows, " << J.bodies << " bodies of " << J.width);
+    CHECK(row_dependence(J.rows, J.bodies, J.width, J.entries, kThreshold).rank == (s.array() > 1e-3).count());
+  }
+  CHECK(clear > 300);
 }
 
 TEST_CASE("a direction that no row reaches is found at its body", "[row_dependence]") {
