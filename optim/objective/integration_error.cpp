@@ -72,6 +72,7 @@ bool may_be_unresolved(const Scene& scene, const std::vector<Objective>& objecti
   if (std::max({s.quadrature.error, s.extreme_quadrature.error, s.gradient_quadrature.error}) > kResolved) return true;
   const IntegratorSettings& given = scene.simulation.integrator;
   if (given.step) return false;
+  if (s.relative_position_violation > std::sqrt(given.rtol)) return true;
   for (std::size_t i = 0; i < objectives.size(); ++i)
     if (objectives[i].mean() && !objectives[i].is_extreme() &&
         given.rtol + given.atol > kResolved * e.psi(static_cast<Eigen::Index>(i)))
