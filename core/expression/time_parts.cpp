@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -132,6 +133,36 @@ std::vector<double> pieces_of(const Program& part, int time, std::vector<double>
   }
   std::sort(instants.begin(), instants.end());
   return instants;
+}
+
+// Between two pieces of ordinary width a jump keeps its size down to two neighbouring numbers.
+std::vector<double> jumps_of(const Program& part, int time, std::vector<double> x, const std::vector<double>& pieces) {
+  Program::Scratch scratch = part.scratch();
+  const auto value = [&](double t) {
+    x[static_cast<std::size_t>(time)] = t;
+    return part.value(x, scratch);
+  };
+  std::vector<double> jumps;
+  double size = 0;
+  for (const double t : pieces)
+    if (const double f = std::abs(value(t)); std::isfinite(f)) size = std::max(size, f);
+  for (std::size_t i = 1; i < pieces.size(); ++i) {
+    double t0 = pieces[i - 1], t1 = pieces[i];
+    if (t1 - t0 > kNarrow * (pieces.back() - pieces.front())) continue;
+    double f0 = value(t0), f1 = value(t1);
+    for (double t = std::midpoint(t0, t1); t > t0 && t < t1; t = std::midpoint(t0, t1)) {
+      const double f = value(t);
+      if (std::abs(f - f0) < std::abs(f1 - f)) {
+        t0 = t, f0 = f;
+      } else {
+        t1 = t;
+        if (!std::isfinite(f)) break;  // abs(x)/x has no value at its jump
+        f1 = f;
+      }
+    }
+    if (std::abs(f1 - f0) > kFlat * size) jumps.push_back(t1);
+  }
+  return jumps;
 }
 
 }  // namespace mbsopt

@@ -22,6 +22,18 @@ namespace {
 constexpr double kMostSteps = 1e10;
 constexpr double kPartsOfPlaced = 1000;  // of rounded_step(): a thousandth moves a stage by less than matters
 
+// Jumps, as those of a held signal.
+std::vector<KinkedSignal> with_jumps(std::vector<KinkedSignal> kinks, std::vector<double> jumps) {
+  std::ranges::sort(jumps);
+  jumps.erase(std::unique(jumps.begin(), jumps.end()), jumps.end());
+  if (jumps.empty()) return kinks;
+  jumps.insert(jumps.begin(), std::nextafter(jumps.front(), -INFINITY));
+  std::vector<double> levels;
+  for (std::size_t i = 0; i < jumps.size(); ++i) levels.push_back(i % 2 == 0 ? 0 : 1);
+  kinks.push_back({std::make_shared<const Curve>(Interpolation::hold, std::move(jumps), std::move(levels)), 0, {}, 0});
+  return kinks;
+}
+
 }  // namespace
 
 RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
@@ -29,12 +41,12 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
     : mechanism_(mechanism),
       settings_(settings),
       rk_(method),
-      kinks_(kinks_of(mechanism, costs)),
       tolerances_(mechanism.data(), settings.integrator),
       attempt_(mechanism_, settings_, rk_, tolerances_),
       guard_(mechanism_.data()),
       penalty_(mechanism_.data()),
-      pulses_(mechanism_, costs, settings.start_time, settings.end_time, pulse_nodes(method)) {}
+      pulses_(mechanism_, costs, settings.start_time, settings.end_time, pulse_nodes(method)),
+      kinks_(with_jumps(kinks_of(mechanism, costs), pulses_.jumps())) {}
 
 // Never beyond the end; an adaptive run does not leave a tiny last step.
 double RungeKuttaRun::propose_step(double t, double h, double end, bool adaptive) const {

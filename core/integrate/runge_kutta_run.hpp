@@ -25,7 +25,7 @@ class Mechanism;
 
 class RungeKuttaRun {
  public:
-  // Steps end at the kinks of the mechanism's laws and of the costs.
+  // Steps end at the kinks of sampled functions in laws and costs, and at the jumps of functions of time.
   RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
                 std::span<const Cost> costs = {});
 
@@ -64,12 +64,12 @@ class RungeKuttaRun {
   const Mechanism mechanism_;
   SimulationSettings settings_;
   const Method& rk_;
-  const std::vector<KinkedSignal> kinks_;
   const ComponentTolerances tolerances_;
   StepAttempt attempt_;
   RunGuard guard_;
   PenaltyWatch penalty_;
   PulseWatch pulses_;
+  const std::vector<KinkedSignal> kinks_;
 };
 
 }  // namespace mbsopt

@@ -48,7 +48,10 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1)
     const double left = difference(a, b, t1 - t0);
     if (!std::isfinite(left) || std::abs(left) <= std::max(kJump * size, kRoundingOfLaw)) return {};
     const double middle = t0 + kPart * (t1 - t0);
-    if (t1 - t0 <= shortest || middle <= t0 || middle >= t1) return {t1, value(b) - value(a)};
+    if (t1 - t0 <= shortest || middle <= t0 || middle >= t1) {
+      const double jump = value(b) - value(a), at_its_rate = (t1 - t0) * std::max(std::abs(rate(a)), std::abs(rate(b)));
+      return std::abs(jump) > 2 * at_its_rate ? Jump{t1, jump} : Jump{};
+    }
     const TimeLaw::Jet m = at(law, middle);
     if (std::abs(difference(a, m, middle - t0)) >= std::abs(difference(m, b, t1 - middle))) {
       t1 = middle, b = m;

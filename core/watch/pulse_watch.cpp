@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/expression/time_parts.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
@@ -44,6 +45,16 @@ PulseWatch::PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, 
     functions_.push_back({{.force = law.force, .drive = law.drive}, std::move(law), nullptr, 0, {}});
   }
   std::erase_if(functions_, [](const Function& f) { return f.size() < kFewest; });
+}
+
+std::vector<double> PulseWatch::jumps() const {
+  std::vector<double> jumps;
+  for (const Function& f : functions_) {
+    if (f.curve) continue;
+    const std::vector<double> here = jumps_of(f.law.part, f.law.time, inputs_, f.law.pieces);
+    jumps.insert(jumps.end(), here.begin(), here.end());
+  }
+  return jumps;
 }
 
 double PulseWatch::value(const Function& f, double t) {

@@ -33,6 +33,9 @@ class PulseWatch {
   PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
              std::vector<QuadratureNode> nodes);
 
+  // The instants at which laws and running costs jump.
+  std::vector<double> jumps() const;
+
   struct Doubt {
     Pulse pulse;        // without its error
     double at, beside;  // t* and t' [s]

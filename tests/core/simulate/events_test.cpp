@@ -57,7 +57,7 @@ SimulationResult run(Scene scene, const std::string& method, int steps) {
 
 }  // namespace
 
-TEST_CASE("with its time declared, a jump leaves a method its order", "[events]") {
+TEST_CASE("a jump leaves a method its order, declared or not", "[events]") {
   Scene scene = GENERATE(with_jump(), with_kink_of_a_drive());
   const auto [method, order, steps] =
       GENERATE(std::tuple("bs3", 3, 128), std::tuple("rk4", 4, 64), std::tuple("dopri5", 5, 32));
@@ -65,10 +65,10 @@ TEST_CASE("with its time declared, a jump leaves a method its order", "[events]"
   const double coarse = (run(scene, method, steps).y_end - exact).norm();
   const double fine = (run(scene, method, 2 * steps).y_end - exact).norm();
   scene.simulation.events = {};
-  const double across = (run(scene, method, 2 * steps).y_end - exact).norm();
-  INFO(method << ": errors " << coarse << ", " << fine << "; across the jump " << across);
+  const double found = (run(scene, method, 2 * steps).y_end - exact).norm();
+  INFO(method << ": errors " << coarse << ", " << fine << "; not declared " << found);
   CHECK(std::log2(coarse / fine) == Approx(order).margin(0.35));
-  CHECK(across > 5 * fine);
+  CHECK(found == Approx(fine).epsilon(0.01));
 }
 
 TEST_CASE("no step crosses an event, and the next one begins there", "[events]") {
@@ -92,7 +92,8 @@ TEST_CASE("no step crosses an event, and the next one begins there", "[events]")
 }
 
 TEST_CASE("a step whose end meets the event by chance is not followed by a tiny one", "[events]") {
-  Scene scene = with_jump();
+  Scene scene = double_pendulum();
+  scene.simulation.end_time = 0.5;
   scene.simulation.events = {0.25};
   scene.simulation.integrator.type = "rk4", scene.simulation.integrator.step = 0.01;
   const SimulationResult result = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
@@ -100,7 +101,7 @@ TEST_CASE("a step whose end meets the event by chance is not followed by a tiny 
   CHECK(result.statistics.steps == 50);
 }
 
-TEST_CASE("step-size control meets fewer rejections when it knows of a jump", "[events]") {
+TEST_CASE("step-size control finds a jump of time as if it were declared", "[events]") {
   Scene scene = with_jump();
   scene.simulation.integrator.rtol = 1e-9, scene.simulation.integrator.atol = 1e-11;
   const Mechanism mechanism(scene, nominal(scene));
@@ -109,8 +110,8 @@ TEST_CASE("step-size control meets fewer rejections when it knows of a jump", "[
   const SimulationResult hidden = simulate(mechanism, scene.simulation);
   INFO(declared.statistics.steps << " and " << hidden.statistics.steps << " steps");
   REQUIRE((declared.ok() && hidden.ok()));
-  CHECK(declared.statistics.rejected < hidden.statistics.rejected);
-  CHECK(declared.statistics.rhs_evaluations < hidden.statistics.rhs_evaluations);
+  CHECK(hidden.statistics.rejected <= declared.statistics.rejected);
+  CHECK(hidden.statistics.rhs_evaluations <= declared.statistics.rhs_evaluations);
 }
 
 TEST_CASE("gradients are exact across events", "[events]") {

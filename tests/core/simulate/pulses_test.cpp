@@ -114,7 +114,8 @@ TEST_CASE("CVODES sees a double pulse to its tolerance of the speed within it", 
 TEST_CASE("a fast step of a drive is resolved in integrated runs", "[pulses]") {
   const std::string method = GENERATE(as<std::string>{}, "dopri853", "dopri5", "radau5", "rodas4");
   const double eps = GENERATE(1e-3, 1e-5);
-  CAPTURE(method, eps);
+  const bool smooth = GENERATE(true, false);  // or its second derivative jumps where it begins and ends
+  CAPTURE(method, eps, smooth);
   Scene scene = cart("0", 6, method);
   scene.bodies.push_back(plain_body("load", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
   scene.sensors = {point_sensor("x", "position", "cart", vec("0", "0", "0"), "x"),
@@ -124,7 +125,8 @@ TEST_CASE("a fast step of a drive is resolved in integrated runs", "[pulses]") {
   scene.forces = {{"pull", pull}};
   Drive motor;
   motor.name = "motor", motor.type = "displacement", motor.joint = "slide";
-  motor.law = f("0.05*P*(1 + tanh((t - 2.3456)/" + std::to_string(eps) + "))");
+  const std::string x = "(t - 2.3456)/" + std::to_string(eps), u = "min(1, max(0, 0.5 + " + x + "))";
+  motor.law = f(smooth ? "0.05*P*(1 + tanh(" + x + "))" : "0.1*P*(3*(" + u + ")^2 - 2*(" + u + ")^3)");
   scene.drives = {motor};
   const double way = 0.1 * (1 - std::cos(std::sqrt(40.0) * (6 - 2.3456)));
   const Run r = run_of(scene, std::make_shared<Place>());
