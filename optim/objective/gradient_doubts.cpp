@@ -95,7 +95,11 @@ std::vector<std::string> gradient_doubts(const Evaluator& evaluator, const Evalu
   Evaluator other(with_other_tolerances(scene, steps).value_or(with_errors_times(0.1, scene, steps)),
                   evaluator.objectives(), names, options);
   const Evaluation& e = other.gradients(at.rho);
-  if (!e.ok) return said;
+  if (!e.ok)
+    return {
+        fmt::format("the steps may not resolve the gradients, which a run with other tolerances would show if it "
+                    "did not fail: {}",
+                    e.message)};
   return unresolved_gradients(of_variables, evaluator.objectives(), at.psi, at.psi_rho,
                               {(e.psi - at.psi).cwiseAbs(), (e.psi_rho - at.psi_rho).cwiseAbs()});
 }

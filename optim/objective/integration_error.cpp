@@ -68,11 +68,12 @@ IntegrationError integration_error(const Scene& scene, const std::vector<Objecti
 }
 
 bool may_be_unresolved(const Scene& scene, const std::vector<Objective>& objectives, const Evaluation& e) {
+  constexpr double kDrift = 0.1;  // derivatives of a motion that leaves the constraints are off by more than it is
   const SimulationStatistics& s = e.statistics;
   if (std::max({s.quadrature.error, s.extreme_quadrature.error, s.gradient_quadrature.error}) > kResolved) return true;
   const IntegratorSettings& given = scene.simulation.integrator;
   if (given.step) return false;
-  if (s.relative_position_violation > std::sqrt(given.rtol)) return true;
+  if (s.relative_position_violation > kDrift * kResolved) return true;
   for (std::size_t i = 0; i < objectives.size(); ++i)
     if (objectives[i].mean() && !objectives[i].is_extreme() &&
         given.rtol + given.atol > kResolved * e.psi(static_cast<Eigen::Index>(i)))

@@ -49,7 +49,7 @@ IntegrationError integration_error(const Scene& scene, const std::vector<Objecti
 // Returns whether the estimates of every run allow that a gradient is off by more than kResolved. The estimates are
 // those of its integrals, and rtol times the motion's magnification of a change of parameters. The gradient of an rms
 // divides by the rms: if the rms is hardly larger than the tolerances, the gradient may be all error. Joints that come
-// apart by half of the digits of rtol (CVODES does not project) are a doubt, too.
+// apart (CVODES does not project) are a doubt, too.
 bool may_be_unresolved(const Scene& scene, const std::vector<Objective>& objectives, const Evaluation& gradients);
 
 // Reports, in sentences, gradients that are off by more than kResolved of their largest entry. Each entry is multiplied
