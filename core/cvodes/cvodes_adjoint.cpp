@@ -208,11 +208,14 @@ double Adjoint::largest_step(double t) const {
 bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
   const IntegratorSettings& s = settings_.integrator;
   void* const backward = CVodeGetAdjCVodeBmem(run_.memory(), which_);
+  constexpr double kShortest = 1e-10;  // of the run: nothing is met within it, where forward steps fall to rounding
+  const double least =
+      std::max(kShortest * (settings_.end_time - settings_.start_time), s.options.min_step.value_or(0));
   double h = 0;  // of the next step, which CVODES has chosen; the limit is for the one after it
   for (double now = from; now > t;) {
     const double largest = std::min(largest_step(now - h), s.max_step.value_or(INFINITY));
-    run_.require(CVodeSetMaxStepB(run_.memory(), which_, std::max(largest, s.options.min_step.value_or(0))));
-    const int flag = CVodeB(run_.memory(), t, CV_ONE_STEP);
+    run_.require(CVodeSetMaxStepB(run_.memory(), which_, std::max(largest, least)));
+    const int flag = ++steps_ > s.max_steps ? CV_TOO_MUCH_WORK : CVodeB(run_.memory(), t, CV_ONE_STEP);
     run_.flow().thrown().throw_on();
     if (flag < 0) {
       failed(flag);

@@ -56,7 +56,8 @@ class Adjoint {
   // Room for the steps that the first CVodeF allocates. SUNDIALS 6.4.1 crashes without memory; std::bad_alloc does not.
   std::unique_ptr<std::byte[]> room_;
   int checkpoints_ = 0, which_ = -1;
-  double tie_;  // times closer than this are one
+  long steps_ = 0;  // of the backward run
+  double tie_;      // times closer than this are one
   std::vector<Jump> jumps_;
   // Per objective: source_ is the largest entry of any gradient in y that enters. `running_source_` is the integral
   // over the steps so far of that of the running cost, and last_size_ its entry at the last step.
