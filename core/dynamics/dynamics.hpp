@@ -43,6 +43,7 @@ class Dynamics {
   // Returns the largest residual of J z + gamma over all evaluations: relative to z, or to usual accelerations at the
   // state. It is 0 for penalty.
   double worst_residual() const { return worst_residual_; }
+  void set_worst_residual(double residual) { worst_residual_ = residual; }  // states that were tried do not count
 
  private:
   const Mechanism mechanism_;  // keeps the data alive

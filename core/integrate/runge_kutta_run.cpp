@@ -92,6 +92,7 @@ struct RungeKuttaRun::Course {
   double error = 0;                       // of the step tried last
   double wish = 0;                        // h before a kink made it shorter
   double wanted = 0, largest = INFINITY;  // sizes that the error and the limits allow, where attempt_.passage chooses h
+  double residual = 0, of_rejected = 0;   // the worst of the accelerations, in accepted steps and in others
   std::size_t frozen_index = 0;
   int placed_again = 0;
 
@@ -176,6 +177,7 @@ bool RungeKuttaRun::begin(const Eigen::VectorXd& y_initial, const Eigen::VectorX
     }
   }
   if (attempt_.passage) attempt_.passage->forget();
+  course.residual = attempt_.dynamics.worst_residual();
   return true;
 }
 
@@ -291,6 +293,8 @@ bool RungeKuttaRun::misplaced(Course& course) {
 void RungeKuttaRun::reject(Outcome outcome, Course& course) {
   double& h = course.h;
   SimulationStatistics& count = course.result.statistics;
+  course.of_rejected = std::max(course.of_rejected, attempt_.dynamics.worst_residual());
+  attempt_.dynamics.set_worst_residual(course.residual);
   if (!course.adaptive) {
     course.stop(outcome == Outcome::unsolved          ? SimulationStatus::not_solved
                 : outcome == Outcome::off_constraints ? SimulationStatus::step_too_large
@@ -304,9 +308,9 @@ void RungeKuttaRun::reject(Outcome outcome, Course& course) {
                                            : count.rejections.not_finite);
   constexpr long kRejectionsToAsk = 1000;  // for the cause: far more than a motion that is resolved has
   if (++count.rejected % kRejectionsToAsk == 0) {
-    const std::string objection = weak_joints_objection(
-        error_of_weak_joints(mechanism_, settings_.formulation, attempt_.dynamics.worst_residual(), attempt_.step.t,
-                             attempt_.step.y0, attempt_.step.angles0));
+    const std::string objection =
+        weak_joints_objection(error_of_weak_joints(mechanism_, settings_.formulation, course.of_rejected,
+                                                   attempt_.step.t, attempt_.step.y0, attempt_.step.angles0));
     if (!objection.empty()) {
       course.stop(SimulationStatus::not_credible,
                   fmt::format("of {} steps to t = {:.6g} s {} were rejected: {}", count.steps + count.rejected,
@@ -341,6 +345,7 @@ void RungeKuttaRun::reject(Outcome outcome, Course& course) {
 bool RungeKuttaRun::credible(Course& course) {
   SimulationResult& result = course.result;
   ++result.statistics.steps;
+  course.residual = attempt_.dynamics.worst_residual();
   if (attempt_.projected_out > result.statistics.projected_error) {
     result.statistics.projected_error = attempt_.projected_out;
     result.statistics.projected_error_time = attempt_.step.t;

@@ -141,3 +141,22 @@ TEST_CASE("gradients are exact across events", "[events]") {
   CHECK(bound.statistics.recomputed_steps > 0);
   CHECK(bound.psi_rho == adjoint.psi_rho);
 }
+
+TEST_CASE("states of rejected steps do not count among the accelerations that were not met", "[events]") {
+  Scene scene = double_pendulum();
+  add_parameters(scene, {{"a", 0.4}});
+  scene.gravity = {0.0, -9.81, 0.0};
+  Drive drive;
+  const double begin = 0.1 * GENERATE(range(5, 16));
+  const std::string u = "min(1, max(0, (t - " + std::to_string(begin) + ")/0.1))";
+  drive.name = "motor", drive.type = "angle", drive.joint = "A";
+  drive.law = f("theta0 - 0.6 + a*(" + u + ")^3*(10 - 15*" + u + " + 6*(" + u + ")^2)");
+  scene.drives = {drive};
+  scene.simulation.end_time = 3;
+  scene.simulation.integrator.type = "dopri853";
+  scene.simulation.integrator.rtol = 1e-8, scene.simulation.integrator.atol = 1e-8;
+  const SimulationResult result = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
+  REQUIRE(result.ok());
+  CHECK(result.statistics.rejected > 0);
+  CHECK(result.statistics.max_acceleration_residual < 1e-10);
+}
