@@ -92,6 +92,9 @@ class Loads:
             if self.family.has("swift"):
                 instant, width = self.brief(-4)
                 step = Formula("{}*(1 + tanh((t - {})/{}))", 0.2 * reach, instant, width)
+                if rng.random() < 0.5:  # its second derivative jumps twice
+                    step = Formula("{}*min(1, max(0, (t - {})/{}))^2*(3 - 2*min(1, max(0, (t - {})/{})))", 0.4 * reach,
+                                   instant, width, instant, width)
                 law = fields["law"]
                 fields["law"] = Formula(law.template + " + " + step.template, *law.values, *step.values)
         self.drives.append(fields)
