@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "core/body/state_layout.hpp"
+#include "core/dynamics/planar_bodies.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/sensor/body_at.hpp"
@@ -39,6 +40,17 @@ Vector3d rotation_vector(const Bushing& b, const Eigen::VectorXd& y) {
   return turn.angle() * turn.axis();
 }
 
+// No equation holds the rounding of an acceleration out of the plane, which the predictor would pass on for ever.
+void keep_in_plane(const MechanismData& d, Eigen::VectorXd& a) {
+  const PlanarBodies plane(*d.planar);
+  for (int i = 1; i <= d.n; ++i) {
+    const Index first = StateLayout{d.n}.q(i);
+    const Plane r = plane.vector(a, first), P = plane.turn(at(i), a, first + 3);
+    a.segment<7>(first).setZero();
+    plane.add_vector(r, first, a), plane.add_turn(at(i), P, first + 3, a);
+  }
+}
+
 }  // namespace
 
 // Between two steps a rotation vector reverses through zero or, if zero is farther, through half a turn.
@@ -60,6 +72,7 @@ std::string past_half_turn(const MechanismData& d, const Eigen::VectorXd& before
 
 DrivenPath::DrivenPath(const Mechanism& mechanism, Model model)
     : mechanism_(mechanism),
+      planar_(model == Model::planar),
       projector_(make_projector(mechanism, Projection::position_velocity, model, Free::nothing)) {
   y_hat_.setZero(mechanism.states()), y_next_.setZero(mechanism.states());
 }
@@ -135,6 +148,7 @@ bool DrivenPath::step(double h, double t1) {
   state_.a = (y_next_.tail(half) - state_.y.tail(half)) / h;
   state_.y = y_next_;
   const MechanismData& d = mechanism_.data();
+  if (planar_) keep_in_plane(d, state_.a);
   for (std::size_t k = 0; k < d.angles.size(); ++k) {
     const JointAngle& a = d.angles[k];
     double& angle = state_.angles(static_cast<Index>(k));

@@ -79,6 +79,7 @@ class DrivenPath {
   bool keeps_branch(double h) const;
 
   const Mechanism mechanism_;
+  const bool planar_;
   std::unique_ptr<Projector> projector_;
   Watch watch_;
   std::string objection_;
