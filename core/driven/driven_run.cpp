@@ -50,6 +50,7 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
       schedule_(costs, observed, settings.end_time),
       law_jumps_(mechanism.data()),
       differentiated_(differentiated),
+      events_(settings.events),
       shortest_(1e-9 * std::max(1e-3, settings.end_time - settings.start_time)),
       absolute_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.size()))) {
   if (mechanism.data().needs_motion) {
@@ -65,7 +66,7 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
   }
   if (!running_.empty()) nodes_.resize(kNodes);
   if (!running_.empty() && !options.frozen)
-    instants_ = timed_instants(mechanism, costs, settings.start_time, settings.end_time, shortest_);
+    instants_ = timed_instants(mechanism, costs, settings.start_time, settings.end_time, shortest_, events_);
   g_.resize(running_.size() * kNodes);
   integrals_.resize(running_.size()), errors_.resize(running_.size());
   path_.start(settings.start_time, settings.end_time, start.result().y, start.result().angles);
@@ -114,7 +115,7 @@ struct DrivenRun::Course {
 
 void DrivenRun::go_through_panels(const Take& take) {
   const double end = settings_.end_time;
-  Course course{EventTimes(settings_.events, settings_.start_time, end), {}, end - settings_.start_time};
+  Course course{EventTimes(events_, settings_.start_time, end), {}, end - settings_.start_time};
   const StepSequence* const frozen = options_.frozen;
   if (differentiated_ && !frozen) {
     course.jumps.emplace(mechanism_, settings_, costs_, continued());

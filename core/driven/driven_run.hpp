@@ -98,6 +98,7 @@ class DrivenRun {
   SampleSchedule schedule_;
   LawJumps law_jumps_;
   const bool differentiated_;
+  std::vector<double> events_;       // those of the file, and jumps of functions of time
   const double shortest_;            // step or panel [s]
   std::vector<DrivenTerm> running_;  // of one node
   std::vector<DrivenTerm> at_instant_;

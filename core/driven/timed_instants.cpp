@@ -37,10 +37,12 @@ void add_chords(const KinkedSignal& signal, std::vector<double>& instants) {
 }  // namespace
 
 std::vector<double> timed_instants(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
-                                   double apart) {
+                                   double apart, std::vector<double>& jumps) {
   std::vector<double> instants{start, end};
-  for (const TimedLaw& law : timed_laws(mechanism, costs, start, end))
+  for (const TimedLaw& law : timed_laws(mechanism, costs, start, end)) {
     instants.insert(instants.end(), law.pieces.begin(), law.pieces.end());
+    jumps.insert(jumps.end(), law.jumps.begin(), law.jumps.end());
+  }
   for (const KinkedSignal& signal : kinks_of(mechanism, costs)) add_chords(signal, instants);
   std::erase_if(instants, [&](double t) { return t < start || t > end; });
   std::sort(instants.begin(), instants.end());

@@ -11,9 +11,9 @@
 namespace mbsopt {
 
 // Ascending instants of a run, its start and end among them, that are more than `apart` apart. Between two of them each
-// function is like a cubic.
+// function is like a cubic. Adds the instants at which they jump, where panels must end, to `jumps`.
 std::vector<double> timed_instants(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
-                                   double apart);
+                                   double apart, std::vector<double>& jumps);
 
 // The latest end of a panel from t that is not after t1 and resolves the functions: it is at most some times as long as
 // the shortest interval between instants in it.

@@ -24,7 +24,8 @@ std::vector<TimedLaw> timed_laws(const Mechanism& mechanism, std::span<const Cos
   const auto add = [&](const Program& law, int time, int force, int drive) {
     for (Program& part : time_parts_of(law, P, time)) {
       std::vector<double> pieces = pieces_of(part, time, inputs, start, end);
-      laws.push_back({std::move(part), time, force, drive, std::move(pieces)});
+      std::vector<double> jumps = jumps_of(part, time, inputs, pieces);
+      laws.push_back({std::move(part), time, force, drive, std::move(pieces), std::move(jumps)});
     }
   };
   for (const RowLaw& law : d.laws)

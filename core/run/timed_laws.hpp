@@ -18,6 +18,7 @@ struct TimedLaw {
   int time = 0;                // the input t
   int force = -1, drive = -1;  // the index in the scene; none of a cost
   std::vector<double> pieces;  // start, the instants between, end
+  std::vector<double> jumps;   // the instants at which the part jumps
 };
 
 // All parameters, and zeros for the motion and t.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/expression/time_parts.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
@@ -49,11 +48,7 @@ PulseWatch::PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, 
 
 std::vector<double> PulseWatch::jumps() const {
   std::vector<double> jumps;
-  for (const Function& f : functions_) {
-    if (f.curve) continue;
-    const std::vector<double> here = jumps_of(f.law.part, f.law.time, inputs_, f.law.pieces);
-    jumps.insert(jumps.end(), here.begin(), here.end());
-  }
+  for (const Function& f : functions_) jumps.insert(jumps.end(), f.law.jumps.begin(), f.law.jumps.end());
   return jumps;
 }
 
