@@ -19,9 +19,9 @@
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
+#include "app/starts/json_records.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/starts/other_model.hpp"
-#include "app/starts/residual_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
@@ -123,9 +123,8 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
                                        row.iteration, row.cost, row.gradient_norm, row.step_norm,
                                        counted(row.simulations, "simulation")));
     if (row.iteration > long_run.earlier().last_iteration)
-      long_run.add("iterate", {{"iteration", row.iteration},
-                               {"cost", row.cost},
-                               {"parameters", std::vector<double>(row.parameters.begin(), row.parameters.end())}});
+      long_run.add("iterate",
+                   {{"iteration", row.iteration}, {"cost", row.cost}, {"parameters", entries_of(row.parameters)}});
     return !interrupted();
   };
   options.profile_progress = [&](const std::string& name, double value, double tau) {

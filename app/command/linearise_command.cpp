@@ -64,14 +64,6 @@ std::optional<State> state_at(Run& run, const Mechanism& mechanism, double time)
   return {};
 }
 
-Json rows_of(const Eigen::MatrixXd& A) {
-  Json rows = Json::array();
-  for (Eigen::Index i = 0; i < A.rows(); ++i) {
-    rows.push_back(std::vector<double>(A.row(i).begin(), A.row(i).end()));
-  }
-  return rows;
-}
-
 std::vector<std::string> names_of(const std::vector<int>& places, const auto& list) {
   std::vector<std::string> names;
   for (const int k : places) names.push_back(list[static_cast<std::size_t>(k)].name);

@@ -18,7 +18,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr int kJournalVersion = 3;
+constexpr int kJournalVersion = 4;
 constexpr std::string_view kSealBegin = ",\"sha256\":\"", kSealEnd = "\"}";
 constexpr std::size_t kSealSize = 64;  // of SHA-256 in hex
 // The interval between flushes of evaluations. A flush takes up to 10 ms (measured: 8 ms on ext4 of a virtual disk), so

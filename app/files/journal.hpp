@@ -2,10 +2,10 @@
 // keeps an appended line when the run is killed. A flush to the disk protects lines when the machine stops: evaluations
 // at most every 100 ms, other lines at once.
 //
-//   {"journal": 3, "command": "design", "input": "../five_bar.json", ...}    the first line: what is run, and on what
-//   {"point": {"x": [...], "f": 0.12, "f_x": [...], ...}}                    an evaluation   (point_records.hpp)
+//   {"journal": 4, "command": "design", "input": "../five_bar.json", ...}    the first line: what is run, and on what
+//   {"point": {"x": [...], "f": 0.12, "f_x": [...], ...}}                    an evaluation   (json_records.hpp)
 //   {"hessians": {...}}                                                      second derivatives
-//   {"residuals": {...}}                                                     an experiment   (residual_records.hpp)
+//   {"residuals": {...}}                                                     an experiment   (json_records.hpp)
 //   {"iterate": {"iteration": 3, "objective": ..., "parameters": {...}}}     accepted by the optimiser
 //   {"start": {"start": 7, "status": "converged", ...}}                      a start, or a block of a sweep
 //   {"ended": "ok"}                                                          the status of result.json, which exists

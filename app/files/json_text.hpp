@@ -1,9 +1,12 @@
-// JSON as text. This file alone compiles nlohmann's parser and writer, which cost each source several seconds.
+// JSON as text, and vectors and matrices as JSON. This file alone compiles nlohmann's parser and writer, which cost
+// each source several seconds.
 #pragma once
 
+#include <Eigen/Core>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace mbsopt {
 
@@ -15,5 +18,12 @@ Json read_json_or_discarded(std::string_view text);  // is_discarded() where the
 // indent is the number of spaces per level; -1 writes one line. U+FFFD replaces invalid UTF-8, so check file names
 // before.
 std::string json_text(const Json& json, int indent = -1);
+
+// The numbers of a vector and the rows of a matrix. Their text reads back as the same numbers.
+std::vector<double> entries_of(const Eigen::VectorXd& v);
+Json rows_of(const Eigen::MatrixXd& m);
+// The same vector and matrix. A matrix of another size is a std::length_error.
+Eigen::VectorXd vector_in(const Json& json);
+Eigen::MatrixXd matrix_in(const Json& json, Eigen::Index rows, Eigen::Index columns);
 
 }  // namespace mbsopt

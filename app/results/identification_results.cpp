@@ -286,10 +286,7 @@ void add_to_result(Json& result, const IdentificationResult& fit) {
       result["parameters"][p.name]["variance_inflation"] = inflation(static_cast<Eigen::Index>(k));
     if (fit.statistics.correlation.size() > 0) result["correlation"]["names"].push_back(p.name);
   }
-  for (Eigen::Index i = 0; i < fit.statistics.correlation.rows(); ++i) {
-    const Eigen::VectorXd row = fit.statistics.correlation.row(i);
-    result["correlation"]["matrix"].push_back(std::vector<double>(row.begin(), row.end()));
-  }
+  if (fit.statistics.correlation.size() > 0) result["correlation"]["matrix"] = rows_of(fit.statistics.correlation);
   for (const ExperimentFit& e : fit.experiments) result["experiments"][e.name] = to_json(e);
   result["optimizer"] = {{"type", "trust_region"},           {"status", to_string(fit.status)},
                          {"message", fit.message},           {"iterations", fit.iterations},
@@ -310,7 +307,7 @@ void add_to_result(Json& result, const IdentificationResult& fit) {
   result["identifiability"] = identifiability_of(fit.statistics);
   if (const FitStatistics& s = fit.statistics; s.singular_values.size() > 0) {
     Json& determined = result["identifiability"];
-    determined["singular_values"] = std::vector<double>(s.singular_values.begin(), s.singular_values.end());
+    determined["singular_values"] = entries_of(s.singular_values);
     determined["rank"] = s.rank;
     if (fit.parameters.size() > 1) determined["in_words"] = determined_in_words(fit);
     for (Eigen::Index k = 0; k < s.weakest.size(); ++k)

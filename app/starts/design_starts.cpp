@@ -6,9 +6,10 @@
 #include <cmath>
 
 #include "app/results/case_results.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/starts/distinct_optima.hpp"
+#include "app/starts/json_records.hpp"
 #include "app/starts/multistart.hpp"
-#include "app/starts/point_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/objective/case_evaluator.hpp"
@@ -26,17 +27,6 @@ std::string progress_line(const DesignRow& row) {
                      std::isfinite(row.optimality) ? fmt::format("   optimality {:.1e}", row.optimality) : "",
                      row.simulations > 0 ? "   " + counted(row.simulations, "simulation") : "");
 }
-
-std::vector<Parameter> designed(const Problem& problem) {
-  std::vector<Parameter> parameters;
-  for (const std::string& name : problem.design->variables) {
-    for (const Parameter& p : problem.scene.parameters)
-      if (p.name == name) parameters.push_back(p);
-  }
-  return parameters;
-}
-
-std::vector<double> numbers(const Eigen::VectorXd& values) { return {values.begin(), values.end()}; }
 
 // All runs draw random numbers from seeds that are known before they begin.
 Problem with_seeds(Problem problem, LongRun& long_run) {
@@ -61,14 +51,14 @@ DesignResult single_run(Run& run, LongRun& long_run, const Problem& problem) {
       long_run.add("iterate", {{"iteration", row.iteration},
                                {"objective", row.objective},
                                {"infeasibility", row.violation},
-                               {"parameters", named_values(problem.design->variables, numbers(row.parameters))}});
+                               {"parameters", by_name(problem.design->variables, row.parameters)}});
     return !interrupted();
   };
   return run_design(problem, options);
 }
 
 Problem at_start(Problem problem, int start, const Eigen::VectorXd& values) {
-  problem = with_values(std::move(problem), named_values(problem.design->variables, numbers(values)));
+  problem = with_values(std::move(problem), by_name(problem.design->variables, values));
   if (problem.design->optimizer.seed) *problem.design->optimizer.seed += start;
   return problem;
 }
@@ -76,7 +66,8 @@ Problem at_start(Problem problem, int start, const Eigen::VectorXd& values) {
 // The problem of each start. With all branches, run k begins at start k / modes in mode k % modes.
 std::function<Problem(int)> starts_of(const Problem& problem, int modes) {
   const MultistartSpec& spec = *problem.design->multistart;
-  return [problem, modes, values = start_values(designed(problem), spec, *spec.seed)](int run) {
+  return [problem, modes,
+          values = start_values(parameters_of(problem.scene, problem.design->variables), spec, *spec.seed)](int run) {
     return at_start(problem, run, values[static_cast<std::size_t>(run / modes)]);
   };
 }
@@ -139,7 +130,7 @@ DesignResult told_again(const Problem& problem, const NlpScale& scale, std::opti
   options.records = &records;
   options.simulation_progress = [&](double) { return !stopped || unrecorded || !records.all_recalled(); };
   options.progress = [&](const DesignRow& row) {
-    const Json reached = named_values(problem.design->variables, numbers(row.parameters));
+    const Json reached = by_name(problem.design->variables, row.parameters);
     return !stopped || (unrecorded ? reached != record.at("parameters") : !records.all_recalled());
   };
   options.scale = scale, options.mode = mode;
@@ -165,7 +156,7 @@ void describe_given_cases(const Problem& problem, DesignResult& design) {
 
 // Describes the best run, but with the given problem before it.
 void describe_given(const Problem& problem, const Eigen::VectorXd& before, DesignResult& design) {
-  const std::vector<Parameter> parameters = designed(problem);
+  const std::vector<Parameter> parameters = parameters_of(problem.scene, problem.design->variables);
   for (std::size_t k = 0; k < design.variables.size(); ++k) design.variables[k].initial = parameters[k].value;
   if (!problem.cases.empty()) return describe_given_cases(problem, design);
   const auto value_before = [&](const std::string& objective) {
@@ -186,7 +177,7 @@ void describe_unmoved(const Problem& problem, const Eigen::VectorXd& before, Des
 
 // The problem must have its seeds.
 Json task_of(const Problem& problem, const NlpScale& scale, const std::optional<int>& modes) {
-  Json task{{"seed", *problem.design->multistart->seed}, {"scale", {{"f", scale.f}, {"c", numbers(scale.c)}}}};
+  Json task{{"seed", *problem.design->multistart->seed}, {"scale", {{"f", scale.f}, {"c", entries_of(scale.c)}}}};
   if (problem.design->optimizer.seed) task["optimizer_seed"] = *problem.design->optimizer.seed;
   if (modes) task["modes"] = *modes;
   if (problem.design->sharpness) task["sharpness"] = *problem.design->sharpness;
@@ -231,9 +222,7 @@ StartWork design_start_work(Problem problem, const Json& task) {
   problem.design->multistart->seed = task.at("seed").get<long>();
   if (task.contains("sharpness")) problem.design->sharpness = task["sharpness"].get<double>();
   if (task.contains("optimizer_seed")) problem.design->optimizer.seed = task["optimizer_seed"].get<long>();
-  const std::vector<double> c = task.at("scale").at("c").get<std::vector<double>>();
-  const NlpScale scale{task["scale"].at("f").get<double>(),
-                       Eigen::Map<const Eigen::VectorXd>(c.data(), static_cast<Eigen::Index>(c.size()))};
+  const NlpScale scale{task.at("scale").at("f").get<double>(), vector_in(task["scale"].at("c"))};
   std::optional<int> modes;
   if (task.contains("modes")) modes = task["modes"].get<int>();
   return {task, [from = starts_of(problem, modes.value_or(1)), scale, modes](int start) {

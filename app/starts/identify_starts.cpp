@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/results/objective_units.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
@@ -14,15 +15,6 @@
 
 namespace mbsopt {
 namespace {
-
-std::vector<Parameter> shared_parameters(const Problem& problem) {
-  std::vector<Parameter> parameters;
-  for (const std::string& name : problem.identification->variables) {
-    for (const Parameter& p : problem.scene.parameters)
-      if (p.name == name) parameters.push_back(p);
-  }
-  return parameters;
-}
 
 // The objective that ranks starts. With estimated sigmas, each start ends at a cost of half its degrees of freedom,
 // even for a bad fit. Only with their logarithms is it the likelihood (sigma_estimation.hpp).
@@ -71,9 +63,10 @@ Problem at_fit(const Problem& problem, const Json& record) {
 
 StartWork start_work(const Problem& problem, const std::vector<CsvTable>& data, long seed) {
   const MultistartSpec& spec = *problem.identification->multistart;
-  return {{{"seed", seed}}, [problem, data, starts = start_values(shared_parameters(problem), spec, seed)](int start) {
-            const Eigen::VectorXd& values = starts[static_cast<std::size_t>(start)];
-            const Json named = named_values(problem.identification->variables, {values.begin(), values.end()});
+  const std::vector<std::string>& shared = problem.identification->variables;
+  return {{{"seed", seed}},
+          [problem, data, starts = start_values(parameters_of(problem.scene, shared), spec, seed)](int start) {
+            const Json named = by_name(problem.identification->variables, starts[static_cast<std::size_t>(start)]);
             return record_of_start(with_values(problem, named), data, start);
           }};
 }
@@ -105,7 +98,8 @@ BestStart from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTabl
 
 int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best) {
   std::vector<NewValue> values;
-  for (const Parameter& p : shared_parameters(best)) values.push_back({"", p.name, p.value});
+  for (const Parameter& p : parameters_of(best.scene, best.identification->variables))
+    values.push_back({"", p.name, p.value});
   for (const ExperimentSpec& experiment : best.identification->experiments) {
     for (const auto& [name, value] : experiment.overrides) values.push_back({experiment.name, name, value});
   }

@@ -182,10 +182,12 @@ std::string effort(const Run& run, long simulations, double wall_seconds) {
   return fmt::format("{}, {:.3g} s{}", counted(simulations, "simulation"), wall_seconds, of);
 }
 
-Json named_values(const std::vector<std::string>& names, const std::vector<double>& values) {
-  Json json = Json::object();
-  for (std::size_t k = 0; k < names.size(); ++k) json[names[k]] = values[k];
-  return json;
+std::vector<Parameter> parameters_of(const Scene& scene, const std::vector<std::string>& names) {
+  std::vector<Parameter> parameters;
+  for (const std::string& name : names)
+    std::ranges::copy_if(scene.parameters, std::back_inserter(parameters),
+                         [&](const Parameter& p) { return p.name == name; });
+  return parameters;
 }
 
 Problem with_values(Problem problem, const Json& values) {

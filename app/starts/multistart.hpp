@@ -33,8 +33,8 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
 // "412 simulations, 6.9 s in all 20 starts": the words for an optimisation's effort.
 std::string effort(const Run& run, long simulations, double wall_seconds);
 
-// Parameter values by name.
-Json named_values(const std::vector<std::string>& names, const std::vector<double>& values);
+// The parameters with these names, in their order.
+std::vector<Parameter> parameters_of(const Scene& scene, const std::vector<std::string>& names);
 
 // The problem with other values of some parameters, without the multistart.
 Problem with_values(Problem problem, const Json& values);

@@ -19,8 +19,6 @@ constexpr std::size_t kMostBlocks = 1000;
 
 std::size_t block_size(std::size_t points) { return (points + kMostBlocks - 1) / kMostBlocks; }
 
-std::vector<double> list_of(const Eigen::VectorXd& values) { return {values.begin(), values.end()}; }
-
 Json task_of(const SweepOptions& options, long seed) {
   return {{"vary", options.vary},
           {"samples", options.samples ? Json(*options.samples) : Json()},
@@ -39,15 +37,10 @@ SweepOptions options_in(const Json& task) {
 }
 
 Json to_json(const Evaluation& e, const std::vector<std::optional<double>>& true_values) {
-  Json row{{"psi", list_of(e.psi)}};
-  for (const std::optional<double>& value : true_values) row["true"].push_back(value ? Json(*value) : Json());
-  for (const auto& gradient : e.psi_rho.rowwise()) row["psi_rho"].push_back(list_of(gradient.transpose()));
+  Json row{{"psi", entries_of(e.psi)}};
+  for (const std::optional<double>& value : true_values) row["true"].push_back(or_null(value));
+  if (e.psi_rho.rows() > 0) row["psi_rho"] = rows_of(e.psi_rho);
   return row;
-}
-
-Eigen::VectorXd values_in(const Json& json) {
-  const auto values = json.get<std::vector<double>>();
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
 SweepRow row_of(const Json& json) {
@@ -57,15 +50,11 @@ SweepRow row_of(const Json& json) {
     row.message = json["failed"].get<std::string>();
     return row;
   }
-  row.psi = values_in(json.at("psi"));
+  row.psi = vector_in(json.at("psi"));
   for (const Json& value : json.at("true"))
     row.true_values.push_back(value.is_null() ? std::nullopt : std::optional(value.get<double>()));
-  if (!json.contains("psi_rho")) return row;
-  for (const Json& gradient : json["psi_rho"]) {
-    const Eigen::VectorXd values = values_in(gradient);
-    row.psi_rho.conservativeResize(row.psi_rho.rows() + 1, values.size());
-    row.psi_rho.bottomRows<1>() = values.transpose();
-  }
+  if (json.contains("psi_rho"))
+    row.psi_rho = matrix_in(json["psi_rho"], row.psi.size(), static_cast<Eigen::Index>(json["psi_rho"].at(0).size()));
   return row;
 }
 

@@ -13,7 +13,7 @@
 
 #include "app/json/read_problem.hpp"
 #include "app/report/point_targets.hpp"
-#include "app/starts/point_records.hpp"
+#include "app/starts/json_records.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/start/assembly_equations.hpp"

@@ -9,8 +9,7 @@
 
 #include "app/files/atomic_file.hpp"
 #include "app/files/journal.hpp"
-#include "app/starts/point_records.hpp"
-#include "app/starts/residual_records.hpp"
+#include "app/starts/json_records.hpp"
 #include "optim/problem/regular_file.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 

@@ -1,11 +1,14 @@
-// The points of a design as JSON: finds those of an earlier run, and reports those of this one.
+// The points of a design, and the residuals of an identification, as JSON: finds those of an earlier run, and reports
+// those of this one.
 #pragma once
 
 #include <functional>
 #include <map>
+#include <tuple>
 #include <vector>
 
 #include "app/files/result_json.hpp"
+#include "optim/fit/experiment_stack.hpp"
 #include "optim/solver/nonlinear_program.hpp"
 
 namespace mbsopt {
@@ -32,6 +35,20 @@ class JsonPointRecords : public PointRecords {
   std::map<std::pair<Key, Wanted>, Known> points_;
   std::map<Key, NlpHessians> hessians_;
   std::size_t points_left_ = 0;
+  Tell tell_;
+};
+
+class JsonResidualRecords : public ResidualRecords {
+ public:
+  using Tell = std::function<void(const Json& content)>;
+  JsonResidualRecords(const std::vector<Json>& residuals, Tell tell);
+
+  bool recall(const Asked& asked, Experiment::Residuals& found) override;
+  void record(const Asked& asked, const Experiment::Residuals& found) override;
+
+ private:
+  using Key = std::tuple<std::size_t, std::vector<double>, std::vector<double>>;
+  std::map<Key, Experiment::Residuals> known_;
   Tell tell_;
 };
 
