@@ -14,7 +14,6 @@
 #include "app/results/optimized_problem.hpp"
 #include "app/results/sensor_unit.hpp"
 #include "app/results/trajectory_csv.hpp"
-#include "app/results/variant_results.hpp"
 #include "app/results/window_results.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
@@ -155,20 +154,6 @@ Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& 
   return recovery;
 }
 
-// Variants carry the names of their problems, or of their files if both problems have one name.
-void compare(Run& run, const IdentificationResult& fit, const OtherModel& other) {
-  const CommandOptions& options = run.context.options;
-  const IdentificationResult second = other.fit(simulating(run));
-  run.progress.finish();
-  if (second.status == SolverStatus::stopped) return;
-  std::string names[] = {run.problem.scene.name, other.problem().scene.name};
-  if (names[0] == names[1])
-    names[0] = options.problem_file + (options.sets.empty() ? "" : " with --set"), names[1] = options.compare;
-  const Variant variants[] = {{names[0], fit}, {names[1], second}};
-  print_comparison(run.context.out, variants[0], variants[1]);
-  add_comparison(run.result, variants[0], variants[1]);
-}
-
 // Recovers, draws again and compares a converged fit, as the command line requests.
 void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, const std::optional<OtherModel>& other) {
   const CommandOptions& options = run.context.options;
@@ -182,24 +167,7 @@ void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, c
     print_bootstrap(run.context.out, fit, bootstrap);
     add_bootstrap(run.result, bootstrap);
   }
-  if (!other || interrupted()) return;
-  try {
-    compare(run, fit, *other);
-  } catch (const std::exception& error) {
-    run.warn(fmt::format("--compare: {}: {}", options.compare, error.what()));
-  }
-}
-
-// Uses the chosen integrator of this problem.
-void check(Run& run, OtherModel& other) {
-  const CommandOptions& options = run.context.options;
-  other.check(run.problem.scene, simulating(run));
-  run.progress.finish();
-  if (other.problem().identification->multistart)
-    run.warn(
-        fmt::format("--compare: the multistart of {} is not run, its fit begins at its given values", options.compare));
-  if (!options.sets.empty()) run.warn(fmt::format("--compare: --set does not change {}", options.compare));
-  if (options.preflight) run.warn("--compare: is skipped by --preflight, which fits nothing");
+  if (other && !interrupted()) other->compare(run, fit, simulating(run));
 }
 
 // Residuals at the initial values, whose derivatives are doubted on the way; for --preflight with what the data
@@ -352,7 +320,7 @@ int identify_command(const CommandContext& context) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
   std::optional<OtherModel> other;
-  if (!context.options.compare.empty()) other.emplace(context.options.compare, read_options(context));
+  if (!context.options.compare.empty()) other.emplace(context);
   std::vector<std::string> moved;
   const std::vector<CsvTable> whole = data_of(run.problem, &moved);
   for (const std::string& words : moved) {
@@ -385,7 +353,7 @@ int identify_command(const CommandContext& context) {
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   const IdentificationResult start = at_start(run, needed, data);
-  if (other) check(run, *other);
+  if (other) other->check(run, simulating(run));
   say_channels(run, needed, data, start);
   if (context.options.preflight) return preflight(run, start);
   LongRun long_run(run);

@@ -1,15 +1,13 @@
-// The other model of identify --compare. It is checked before the fit, and fitted after it.
+// The other model of identify --compare. It is checked before the fit, and fitted and compared after it.
 //
-//   OtherModel other(file);                    // read
-//   other.check(run.problem.scene, options);   // cut into windows, simulated once
-//   const IdentificationResult second = other.fit(options);
+//   OtherModel other(context);             // read
+//   other.check(run, options);             // cut into windows, simulated once
+//   other.compare(run, fit, options);
 #pragma once
 
 #include <memory>
-#include <string>
-#include <vector>
 
-#include "app/json/problem_source.hpp"
+#include "app/run/run.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/windows.hpp"
 
@@ -18,14 +16,14 @@ namespace mbsopt {
 class OtherModel {
  public:
   // Throws InputError and std::invalid_argument, with the place in its own file.
-  OtherModel(const std::string& file, const ReadOptions& options);
+  explicit OtherModel(const CommandContext& context);
 
-  const Problem& problem() const { return problem_; }
-  // Takes the integrator of `first`, so that errors of the integration are the same in both fits. Throws InputError
+  // Takes the integrator of the run, so that errors of the integration are the same in both fits. Throws InputError
   // with the place in its own file, and CsvError.
-  void check(const Scene& first, const IdentificationOptions& options);
-  // Call this after check().
-  IdentificationResult fit(const IdentificationOptions& options) const;
+  void check(Run& run, const IdentificationOptions& options);
+  // Adds both fits and their F-test to the result and to standard output. Warns if its fit cannot be made. Call this
+  // after check().
+  void compare(Run& run, const IdentificationResult& fit, const IdentificationOptions& options) const;
 
  private:
   std::shared_ptr<ProblemSource> source_;
