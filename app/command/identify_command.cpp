@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <limits>
+#include <utility>
 
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
@@ -42,13 +44,6 @@ namespace {
 
 std::string without_unit(const std::string& column) { return column.substr(0, column.find(" [")); }
 
-// Ends a part of the plot: neither a curve nor a correlation continues from one window to the next.
-void add_gap(std::vector<double>& times, double next, std::initializer_list<std::vector<double>*> values) {
-  if (times.empty()) return;
-  times.push_back((times.back() + next) / 2);
-  for (std::vector<double>* v : values) v->push_back(std::numeric_limits<double>::quiet_NaN());
-}
-
 // One plot per channel of each record. start holds the initial values; channels that it lacks are left out.
 std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTable>& data,
                                const IdentificationResult& fit, const IdentificationResult& start) {
@@ -61,26 +56,30 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTabl
                      .unit = unit_of_channel(problem.scene, experiment.channels[c], data[e]),
                      .validates = experiment.validate});
   }
-  std::vector<std::optional<std::size_t>> last(plots.size()), last_at_start(plots.size());  // experiment of a plot
-  for (const ResidualRow& row : fit.residuals) {
-    const std::size_t k = channels.first[row.experiment] + row.channel;
-    FitPlot& plot = plots[k];
-    if (last[k] && last[k] != row.experiment)
-      add_gap(plot.times, row.t, {&plot.measured, &plot.model, &plot.residual, &plot.prediction});
-    last[k] = row.experiment;
-    plot.times.push_back(row.t);
-    plot.measured.push_back(row.measured);
-    plot.model.push_back(row.model);
-    plot.residual.push_back(row.scaled);
-    plot.prediction.push_back(row.prediction);
-  }
-  for (const ResidualRow& row : start.residuals) {
-    const std::size_t k = channels.first[row.experiment] + row.channel;
-    FitPlot& plot = plots[k];
-    if (last_at_start[k] && last_at_start[k] != row.experiment) add_gap(plot.initial_times, row.t, {&plot.initial});
-    last_at_start[k] = row.experiment;
-    plot.initial_times.push_back(row.t), plot.initial.push_back(row.model);
-  }
+  // Between the windows of a record lies a gap: neither a curve nor a correlation continues across it.
+  using Column = std::pair<std::vector<double> FitPlot::*, double ResidualRow::*>;
+  const auto add_rows = [&](const IdentificationResult& of, std::vector<double> FitPlot::*times,
+                            std::initializer_list<Column> columns) {
+    std::vector<std::optional<std::size_t>> last(plots.size());  // experiment of a plot
+    for (const ResidualRow& row : of.residuals) {
+      const std::size_t k = channels.first[row.experiment] + row.channel;
+      std::vector<double>& t = plots[k].*times;
+      const bool is_next = last[k] && last[k] != row.experiment;
+      if (is_next) t.push_back((t.back() + row.t) / 2);
+      t.push_back(row.t);
+      for (const auto& [column, value] : columns) {
+        if (is_next) (plots[k].*column).push_back(std::numeric_limits<double>::quiet_NaN());
+        (plots[k].*column).push_back(row.*value);
+      }
+      last[k] = row.experiment;
+    }
+  };
+  add_rows(fit, &FitPlot::times,
+           {{&FitPlot::measured, &ResidualRow::measured},
+            {&FitPlot::model, &ResidualRow::model},
+            {&FitPlot::residual, &ResidualRow::scaled},
+            {&FitPlot::prediction, &ResidualRow::prediction}});
+  add_rows(start, &FitPlot::initial_times, {{&FitPlot::initial, &ResidualRow::model}});
   // A fit that ended within its first evaluation has no residuals.
   std::erase_if(plots, [](const FitPlot& plot) { return plot.times.empty(); });
   return plots;
@@ -176,7 +175,7 @@ IdentificationResult at_start(Run& run, const Problem& needed, const std::vector
   IdentificationOptions options;
   options.threads = case_threads(run), options.simulation_progress = [](double) { return !interrupted(); };
   FitStart start = start_of_fit(needed, data, options);
-  for (const std::string& warning : start.doubts) run.warn(warning);
+  run.warn(start.doubts);
   if (!run.context.options.preflight) return std::move(start.residuals);
   options = simulating(run), options.preflight = true;
   start.residuals = run_identification(needed, data, options);
@@ -198,7 +197,7 @@ int preflight(Run& run, const IdentificationResult& start) {
   }
   print_preflight(run.context.out, start);
   add_preflight(run.result, start);
-  for (const std::string& warning : start.warnings) run.warn(warning);
+  run.warn(start.warnings);
   return run.finish();
 }
 
@@ -241,8 +240,7 @@ SimulatedExperiment simulate_first_experiment(Run& run, const Problem& needed, c
   SimulatedExperiment experiment = simulated_experiment(run, simulated_scene(needed, data));
   const SimulationResult& first = experiment.simulation;
   run.result["simulation"] = to_json(first.statistics);
-  if (first.ok())
-    for (const std::string& warning : simulation_warnings(experiment.scene, first.statistics)) run.warn(warning);
+  if (first.ok()) run.warn(simulation_warnings(experiment.scene, first.statistics));
   warn_of_stiffness(run, first.statistics, true);
   return experiment;
 }
@@ -340,7 +338,7 @@ int identify_command(const CommandContext& context) {
     add_model(mechanism, scene.simulation, model);
     run.result["model"] = to_json(model);
     print_model(context.out, scene.name, model);
-    for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
+    run.warn(model_warnings(mechanism, assembly));
   }
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(cut.problem, &left_out);
@@ -348,8 +346,7 @@ int identify_command(const CommandContext& context) {
   if (!context.options.profiles.empty())  // before anything is fitted
     profiled_unknowns(context.options.profiles,
                       names_of(unknowns_of_fit(needed.scene, *needed.identification), *needed.identification));
-  if (context.options.preflight)  // a fit cuts again, for the values of the best start, and warns then
-    for (const std::string& warning : cut.warnings) run.warn(warning);
+  if (context.options.preflight) run.warn(cut.warnings);  // a fit cuts again, at the best start, and warns then
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   const IdentificationResult start = at_start(run, needed, data);
@@ -366,7 +363,7 @@ int identify_command(const CommandContext& context) {
   set_units(fit, cut.problem, data);
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, fit.simulations, fit.wall_seconds));
-  for (const std::string& warning : fit.warnings) run.warn(warning);
+  run.warn(fit.warnings);
   const Trajectory history = history_of(fit);
   run.write("optimized.json", optimized_problem_text(run, new_values(fit)));
   run.write("history.csv", to_csv(history));
