@@ -8,7 +8,6 @@
 
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/fit_result.hpp"
-#include "optim/fit/identification_options.hpp"
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"

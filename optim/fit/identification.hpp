@@ -20,7 +20,6 @@
 #include <vector>
 
 #include "optim/fit/fit_result.hpp"
-#include "optim/fit/identification_options.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
