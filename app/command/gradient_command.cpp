@@ -8,7 +8,6 @@
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
-#include "app/results/left_out_bodies.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"

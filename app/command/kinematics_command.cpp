@@ -7,7 +7,7 @@
 
 #include "app/report/run_report.hpp"
 #include "app/results/joint_forces.hpp"
-#include "app/results/sensor_unit.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/results/simulated_motion.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"

@@ -3,11 +3,11 @@
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/results/recommended_problem.hpp"
+#include "app/results/optimized_problem.hpp"
 #include "app/results/tradeoff_csv.hpp"
 #include "app/results/tradeoff_results.hpp"
 #include "app/run/command.hpp"
-#include "app/run/machine.hpp"
+#include "app/run/provenance.hpp"
 #include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
 #include "app/terminal/interrupt.hpp"
@@ -50,7 +50,7 @@ void sweep(Run& run) {
   add_given_settings(run, tradeoff);
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
   const CutProblem cut = cut_into_windows(problem, data, {}, [](double) { return !interrupted(); });
-  for (const std::string& warning : cut.warnings) run.warn(warning);
+  run.warn(cut.warnings);
   tradeoff.interrupted = tradeoff.interrupted || interrupted();
   // The sum of squares of `identify` is not an objective of the file; the integrator limits its accuracy.
   std::optional<FitErrors> fit;

@@ -10,7 +10,7 @@
 #include "app/report/report_parts.hpp"
 #include "app/report/row_plot.hpp"
 #include "app/report/run_report.hpp"
-#include "app/results/sensor_unit.hpp"
+#include "app/results/objective_units.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {

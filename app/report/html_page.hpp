@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/report/page_arrays.hpp"
+#include "app/report/html_text.hpp"
 
 namespace mbsopt {
 

@@ -1,8 +1,11 @@
-// Text in HTML, and text in a string of the JSON within a page.
+// Text in HTML, and the JSON within a page: its texts, its arrays of numbers.
 #pragma once
 
+#include <cstddef>
+#include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace mbsopt {
 
@@ -18,5 +21,21 @@ std::string json_list(const Items& items, const TextOf& text_of) {
 }
 // JSON for a script of a page. "<" stands in texts only, and "</script" or "<!--" would change what the browser reads.
 std::string without_tags(std::string json);
+
+// The arrays of numbers that the script of a page reads, each array once.
+//
+//   PageArrays arrays;
+//   arrays.add({0, 0.5, 1});   // 0
+//   arrays.add({0, 0.5, 1});   // 0 again
+class PageArrays {
+ public:
+  // Returns the number of the array. Its values have so many digits, and infinite ones become null.
+  std::size_t add(const std::vector<double>& values, int digits = 6);
+  std::string text() const;  // JSON: [[...], ...]
+
+ private:
+  std::map<std::string, std::size_t> numbers_;
+  std::vector<std::string> texts_;
+};
 
 }  // namespace mbsopt

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "app/report/html_text.hpp"
-#include "app/report/page_arrays.hpp"
 
 namespace mbsopt {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "app/results/sensor_unit.hpp"
+#include "app/results/objective_units.hpp"
 
 namespace mbsopt {
 namespace {

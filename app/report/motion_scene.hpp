@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "app/report/page_arrays.hpp"
+#include "app/report/html_text.hpp"
 #include "app/report/point_targets.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "core/scene/scene.hpp"

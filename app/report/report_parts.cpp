@@ -9,8 +9,8 @@
 
 #include "app/report/line_plot.hpp"
 #include "app/report/motion_plots.hpp"
-#include "app/results/sensor_unit.hpp"
-#include "app/run/energy_balance.hpp"
+#include "app/results/objective_units.hpp"
+#include "app/run/run.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "core/expression/dimension.hpp"

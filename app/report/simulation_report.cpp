@@ -6,7 +6,7 @@
 #include "app/report/motion_plots.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/run_report.hpp"
-#include "app/results/sensor_unit.hpp"
+#include "app/results/objective_units.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {

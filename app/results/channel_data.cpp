@@ -1,11 +1,14 @@
 #include "app/results/channel_data.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "app/results/sensor_unit.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/terminal/text_table.hpp"
+#include "core/expression/counted.hpp"
 #include "optim/fit/experiment.hpp"
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/machine/median.hpp"
@@ -116,6 +119,20 @@ Json to_json(const std::vector<ChannelData>& channels) {
                    {"most", c.most},
                    {"rms_scaled", c.rms_scaled}});
   return all;
+}
+
+void add_windows(Run& run, const Problem& cut) {
+  for (const ExperimentSpec& e : cut.identification->experiments) {
+    if (!e.origin) continue;
+    Json& windows = run.result["windows"][e.origin->experiment];
+    if (windows.is_null()) windows = {{"start_time", *e.start_time}};
+    windows["count"] = e.origin->number, windows["end_time"] = *e.end_time;
+  }
+  if (!run.result.contains("windows")) return;
+  for (const auto& [name, windows] : run.result["windows"].items())
+    run.context.out << fmt::format("{}: {} from {:g} to {:g} s\n", name,
+                                   counted(windows["count"].get<std::size_t>(), "window"),
+                                   windows["start_time"].get<double>(), windows["end_time"].get<double>());
 }
 
 }  // namespace mbsopt

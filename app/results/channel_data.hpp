@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "app/files/result_json.hpp"
+#include "app/run/run.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/problem/csv_table.hpp"
 
@@ -32,5 +32,8 @@ Json to_json(const std::vector<ChannelData>& channels);
 
 // The SI unit of a column; kUnknownUnit if neither the file nor the sensor tells.
 std::string unit_of_channel(const Scene& scene, const ChannelSpec& channel, const CsvTable& data);
+
+// Adds the windows of experiments to the result, "windows", and prints them. cut: cut_into_windows.
+void add_windows(Run& run, const Problem& cut);
 
 }  // namespace mbsopt

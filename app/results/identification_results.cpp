@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/files/csv_cell.hpp"
+#include "app/results/trajectory_csv.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/problem/problem_vocabulary.hpp"

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <optional>
 
-#include "app/results/sensor_unit.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/dimension_inference.hpp"
 #include "core/scene/scene_facts.hpp"
+#include "core/scene/type_table.hpp"
 
 namespace mbsopt {
 namespace {
@@ -134,6 +134,23 @@ void add_units(Json& result, const ObjectiveUnits& units) {
   add(result);
   if (result.contains("cases"))
     for (Json& of_case : result["cases"]) add(of_case);
+}
+
+// Power is effort times rate: the unit is N if the coordinate is a length, N m if it is an angle or a number.
+std::string unit_of_effort(const Drive& drive) {
+  return dimension_of_drive(drive.type, drive.coordinate) == dimension::kLength ? "N" : "N m";
+}
+
+std::string unit_in(const Scene& scene, const Sensor& sensor) {
+  if (sensor.quantity == "force") {
+    const auto force = std::ranges::find(scene.forces, sensor.force, &Force::name);
+    if (force != scene.forces.end()) return std::holds_alternative<Tsda>(force->kind) ? "N" : "N m";
+  }
+  if (sensor.quantity == "drive_force") {
+    const auto drive = std::ranges::find(scene.drives, sensor.drive, &Drive::name);
+    if (drive != scene.drives.end()) return unit_of_effort(*drive);
+  }
+  return unit_of(scene, sensor);
 }
 
 }  // namespace mbsopt

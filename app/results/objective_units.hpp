@@ -1,5 +1,5 @@
-// Objectives in results: their values, beside a smooth maximum or minimum the true one, their gradients, and their SI
-// units, from those of their sensors, parameters and the time.
+// Units in results, and objectives: their values, beside a smooth maximum or minimum the true one, their gradients, and
+// their SI units, from those of their sensors, parameters and the time.
 //
 //   objective_units(problem).at("path");   // "m^2" of samples of (x - 0.1)^2, "-" of a number
 #pragma once
@@ -13,6 +13,14 @@
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt {
+
+inline constexpr const char* kUnknownUnit = "SI unit";  // is shown where a unit is not known
+
+// The unit of a sensor in its scene: there a force or a drive acts along a line or about an axis.
+std::string unit_in(const Scene& scene, const Sensor& sensor);
+
+// Names the unit of the force or torque along a drive's coordinate.
+std::string unit_of_effort(const Drive& drive);
 
 // The unit by the objective's name; empty if its parts do not determine it. Numbers without a unit count as pure.
 using ObjectiveUnits = std::map<std::string, std::string>;

@@ -10,6 +10,7 @@
 #include "app/json/source_text.hpp"
 #include "app/run/run.hpp"
 #include "core/scene/scene_path.hpp"
+#include "core/scene/vocabulary.hpp"
 
 namespace mbsopt {
 namespace {
@@ -26,6 +27,70 @@ Json json_of(const OrientationField& field) {
   if (const auto* const a = std::get_if<AxisAngleField>(&field))
     return {{"axis", json_of(a->axis)}, {"angle", json_of(a->angle)}};
   return {{"rpy", json_of(std::get<RollPitchYawField>(field).rpy)}};
+}
+
+std::string text_of(const Json& object) {
+  std::string text;
+  for (const auto& [key, value] : object.items())
+    text += (text.empty() ? "" : ", ") + json_text(key) + ": " + json_text(value);
+  return "{" + text + "}";
+}
+
+// A visitor of the vocabulary: writes the fields of settings as in a problem file. An absent field is left out.
+class SettingsWriter {
+ public:
+  Json json = Json::object();
+
+  void plain(std::string_view key, const auto& value, const Range&, const Says&) { put(key, value); }
+  template <class T>
+  void plain(std::string_view key, const std::optional<T>& value, const Range&, const Says&) {
+    if (value) put(key, *value);
+  }
+  void word(std::string_view key, const std::string& value, const Words&, const Says&) {
+    if (!value.empty()) put(key, value);
+  }
+  void choice(std::string_view key, const auto& value, const auto& choices, const Says&) {
+    for (const auto& choice : choices)
+      if (choice.value == value) put(key, choice.word);
+  }
+  // The kinds have the same scale as the smallest tolerance.
+  void tolerance(std::string_view key, double smallest, const std::optional<KindTolerances>& given, const Says& says) {
+    if (!given) return put(key, smallest);
+    KindTolerances kinds = *given;
+    const double scale = smallest / kinds.smallest();
+    for (std::optional<double>* const kind : {&kinds.position, &kinds.angle, &kinds.velocity, &kinds.rate})
+      if (*kind) **kind *= scale;
+    for (auto& [body, value] : kinds.bodies) value *= scale;
+    object(key, std::as_const(kinds), says);
+  }
+  void values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, To, const Range&,
+                 const Says&) {
+    for (const auto& [name, value] : values) json[std::string(key)][name] = value;
+  }
+  void object(std::string_view key, const auto& settings, const Says&) {
+    SettingsWriter inside;
+    describe(inside, settings);
+    if (!inside.json.empty()) put(key, inside.json);
+  }
+  void misplaced(std::string_view, std::string_view) {}
+
+ private:
+  void put(std::string_view key, const auto& value) { json[std::string(key)] = value; }
+};
+
+Json integrator_json(const IntegratorSettings& s) {
+  SettingsWriter writer;
+  describe(writer, s);
+  if (s.step) writer.json.erase("rtol"), writer.json.erase("atol");
+  if (s.max_steps == IntegratorSettings{}.max_steps) writer.json.erase("max_steps");
+  return writer.json;
+}
+
+Json formulation_json(const FormulationSettings& f) {
+  SettingsWriter writer;
+  describe(writer, f);
+  if (f.type == FormulationType::penalty) writer.json.erase("iterations"), writer.json.erase("tolerance");
+  return writer.json;
 }
 
 }  // namespace
@@ -60,6 +125,16 @@ std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& 
     text = with_value(text, body + ".position", json_text(json_of(poses[i].position)));
     text = with_value(text, body + ".orientation", json_text(json_of(poses[i].orientation)));
   }
+  return text;
+}
+
+std::string recommended_problem_text(const Run& run, const SimulationSettings& settings) {
+  std::string text = optimized_problem_text(run, {});
+  text = without_member(text, "simulation.accuracy");  // it was a choice, too
+  text = with_value(text, "simulation.integrator", text_of(integrator_json(settings.integrator)));
+  const Json formulation = formulation_json(settings.formulation);
+  if (formulation != formulation_json(run.problem.scene.simulation.formulation))
+    text = with_value(text, "simulation.formulation", text_of(formulation));
   return text;
 }
 

@@ -21,4 +21,8 @@ class Run;
 std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values,
                                    const std::vector<Body>& poses = {});
 
+// recommended.json: the problem of the run with other integrator and formulation settings. Comments and formatting
+// stay, except inside simulation.integrator and .formulation.
+std::string recommended_problem_text(const Run& run, const SimulationSettings& settings);
+
 }  // namespace mbsopt

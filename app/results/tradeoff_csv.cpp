@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/files/csv_cell.hpp"
+#include "app/results/trajectory_csv.hpp"
 #include "core/scene/vocabulary.hpp"
 
 namespace mbsopt {

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "app/files/csv_cell.hpp"
 #include "core/run/output_times.hpp"
 
 namespace mbsopt {
@@ -60,6 +59,15 @@ std::optional<std::string> to_csv(const Trajectory& trajectory, const std::funct
 
 std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) {
   return *to_csv({columns, rows}, [](double) { return true; });
+}
+
+std::string csv_cell(std::string_view text) {
+  const bool formula = !text.empty() && std::string_view("=+-@\t\r").find(text.front()) != std::string_view::npos;
+  const std::string cell = (formula ? "'" : "") + std::string(text);
+  if (cell.find_first_of(",\"\n\r") == std::string::npos) return cell;
+  std::string quoted = "\"";
+  for (const char c : cell) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
 }
 
 }  // namespace mbsopt

@@ -35,4 +35,8 @@ inline std::string to_csv(const Trajectory& trajectory) { return to_csv(trajecto
 // The same text; nothing if `go_on`, which gets the first number of each row, returns false.
 std::optional<std::string> to_csv(const Trajectory& trajectory, const std::function<bool(double)>& go_on);
 
+// A text as a cell of a CSV file. A comma, a quote or a line's end puts it in quotes (RFC 4180). An apostrophe precedes
+// a text that a spreadsheet would run as a formula (OWASP, "CSV injection").
+std::string csv_cell(std::string_view text);
+
 }  // namespace mbsopt

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <set>
 
-#include "app/results/sensor_unit.hpp"
+#include "app/results/objective_units.hpp"
 
 namespace mbsopt {
 namespace {

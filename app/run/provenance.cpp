@@ -3,14 +3,19 @@
 #include <IpoptConfig.h>
 #include <fmt/format.h>
 #include <nlopt.h>
+#include <stdlib.h>  // getloadavg
 #include <sundials/sundials_config.h>
 #include <CLI/Version.hpp>
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <thread>
 
+#include "app/files/json_text.hpp"
 #include "app/files/sha256.hpp"
+#include "core/expression/counted.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/regular_file.hpp"
 
@@ -56,6 +61,15 @@ std::string seen_from(const std::filesystem::path& folder, const std::filesystem
   return std::filesystem::absolute(file).lexically_normal().lexically_relative(folder).generic_string();
 }
 
+std::string cpu_model() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown processor";
+}
+
 }  // namespace
 
 std::string program_version() { return MBSOPT_VERSION; }
@@ -78,6 +92,16 @@ nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, con
   for (const std::string& file : data_files) result["data_sha256"][seen_from(folder, file)] = checksum_of(file);
   result["libraries"] = library_versions();
   return result;
+}
+
+Json machine_json() {
+  double load = 0;
+  const bool told = getloadavg(&load, 1) == 1;
+  return {{"cpu", cpu_model()}, {"cores", std::thread::hardware_concurrency()}, {"load", told ? Json(load) : Json()}};
+}
+
+std::string machine_name(const Json& machine) {
+  return fmt::format("{}, {}", machine.at("cpu").get<std::string>(), counted(machine.at("cores").get<int>(), "core"));
 }
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// The provenance of a result: enough to repeat it, and nothing that changes from run to run.
+// The provenance of a result: enough to repeat it, and nothing that changes from run to run. The machine of a run.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -15,5 +15,11 @@ std::string sha256_of_file(const std::string& path);  // lower-case hex; empty w
 // cannot be read.
 nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, const std::string& input_as_stored,
                                   const std::string& problem_file, const std::vector<std::string>& data_files);
+
+// The machine that measured times: {"cpu": "Intel(R) Core(TM) i7-8700", "cores": 12, "load": 0.4}. The load is the
+// average number of running processes over the last minute, or null if the system does not give it.
+nlohmann::ordered_json machine_json();
+// "Intel(R) Core(TM) i7-8700, 12 cores"
+std::string machine_name(const nlohmann::ordered_json& machine);
 
 }  // namespace mbsopt

@@ -7,12 +7,13 @@
 #include <utility>
 
 #include "app/json/problem_source.hpp"
-#include "app/run/energy_balance.hpp"
 #include "app/run/provenance.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/mechanism/derivative_blocks.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/scene_path.hpp"
 #include "core/start/model_warnings.hpp"
 #include "core/watch/start_failure.hpp"
@@ -255,6 +256,25 @@ void print_simulation(std::ostream& out, const Scene& scene, const SimulationSta
                        static_cast<double>(statistics.adjoint_memory_bytes) / (1024 * 1024),
                        counted(statistics.recomputed_steps, "step"));
   }
+}
+
+bool conserves_energy(const Scene& scene) {
+  const std::vector<bool> none(scene.parameters.size(), false);
+  return conserves_energy(Mechanism(scene, parameter_values(scene), none).data());
+}
+
+void say_left_out(Run& run, const std::vector<std::string>& bodies, const char* judged_by) {
+  if (bodies.empty()) return;
+  run.result["model"]["left_out"] = bodies;
+  run.context.out << fmt::format("not simulated, since no {} depends on them: {}\n", judged_by,
+                                 fmt::join(bodies, ", "));
+}
+
+void add_derivative_counts(Run& run, const Scene& simulated, const SimulationStatistics& statistics) {
+  const Mechanism mechanism(simulated, parameter_values(simulated));
+  Json& json = run.result["simulation"];
+  json["derivative_blocks"] = statistics.linearised_states * derivative_blocks(mechanism.data());
+  json["differentiated_numbers"] = mechanism.data().slots();
 }
 
 }  // namespace mbsopt

@@ -98,4 +98,15 @@ bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, b
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary);
 void print_simulation(std::ostream& out, const Scene& scene, const SimulationStatistics& statistics);
 
+// Returns whether only gravity and springs with constant coefficients act, so that the total energy is constant.
+bool conserves_energy(const Scene& scene);
+// These words follow a change of energy that is not conserved.
+inline constexpr const char* kWorkIsDone = "with the work of dampers, actuators and laws, no measure of the error";
+
+// Says which bodies do not affect the answer and are not simulated. judged_by: "objective", "measurement"
+void say_left_out(Run& run, const std::vector<std::string>& bodies, const char* judged_by);
+// Adds counts of runs with derivatives to result.simulation, which must exist: blocks evaluated
+// (core/mechanism/derivative_blocks.hpp), and numbers of the model that parameters change.
+void add_derivative_counts(Run& run, const Scene& simulated, const SimulationStatistics& statistics);
+
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-#include "app/starts/mpi_ranks.hpp"
+#include "app/starts/ranks.hpp"
 
 #include <cstdlib>
 #include <stdexcept>

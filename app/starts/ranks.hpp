@@ -6,6 +6,7 @@
 //   to rank 0   {"reply": 7, "ok": true, "text": "..."} {"interrupted": true} {"failed": "why"}
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -27,5 +28,10 @@ struct Ranks {
   virtual void send(int to, const std::string& text) = 0;
   virtual std::optional<Message> receive() = 0;  // does not wait: none where nothing has come
 };
+
+// The ranks of an MPI run (mpirun -n 8 mbsopt identify problem.json): joins the run for which mpirun started this
+// process. Returns null, without MPI, if it did not, or if it started one process only. Throws std::runtime_error if
+// this build has no MPI, or finds no library.
+std::unique_ptr<Ranks> mpi_ranks();
 
 }  // namespace mbsopt

@@ -7,8 +7,8 @@
 #include <iterator>
 #include <numeric>
 #include <stdexcept>
-#include <thread>
 
+#include "app/results/case_results.hpp"
 #include "app/terminal/interrupt.hpp"
 
 namespace mbsopt {
@@ -107,11 +107,7 @@ void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int
 }
 
 // Under mpirun the number of ranks determines how many starts run at a time.
-int workers_of(const Run& run) {
-  const int asked = run.context.options.threads;
-  if (asked > 0) return asked;
-  return run.context.ranks ? 1 : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-}
+int workers_of(const Run& run) { return run.context.ranks && run.context.options.threads == 0 ? 1 : case_threads(run); }
 
 }  // namespace
 

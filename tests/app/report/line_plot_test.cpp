@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "app/report/page_arrays.hpp"
+#include "app/report/html_text.hpp"
 
 using namespace mbsopt;
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "app/results/sensor_unit.hpp"
+#include "app/results/objective_units.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 
 using namespace mbsopt;

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "app/json/read_problem.hpp"
-#include "app/results/sensor_unit.hpp"
 #include "source_folder.hpp"
 
 using namespace mbsopt;

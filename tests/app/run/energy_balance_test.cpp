@@ -1,4 +1,4 @@
-#include "app/run/energy_balance.hpp"
+#include "app/run/run.hpp"
 
 #include <catch2/catch.hpp>
 

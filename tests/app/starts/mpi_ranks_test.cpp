@@ -1,5 +1,5 @@
 // The program under mpirun. Compiled where it is built with MPI.
-#include "app/starts/mpi_ranks.hpp"
+#include "app/starts/ranks.hpp"
 
 #include <signal.h>
 #include <sys/wait.h>

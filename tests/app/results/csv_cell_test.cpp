@@ -1,4 +1,3 @@
-#include "app/files/csv_cell.hpp"
 
 #include <catch2/catch.hpp>
 
