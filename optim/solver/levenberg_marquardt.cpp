@@ -336,7 +336,9 @@ class Search {
     const VectorXd D = lengths.unaryExpr([](double length) { return length > 0 ? length : 1; });
     const RowBlocks A = model.R.scaled_and_damped(D, lambda);  // of D d: columns of length one
     const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
-    return bounded_linear_least_squares(A, model.R.beside_damping(-model.q), lower, upper).cwiseQuotient(D);
+    VectorXd b = VectorXd::Zero(model.q.size() + D.size());
+    b.head(model.q.size()) = -model.q;
+    return bounded_linear_least_squares(A, b, lower, upper).cwiseQuotient(D);
   }
 
   // If a step ends at a bound, x equals that bound.

@@ -157,39 +157,17 @@ VectorXd RowBlocks::solve(const VectorXd& b, const std::vector<Index>& free) con
   return d;
 }
 
-std::vector<std::vector<std::size_t>> RowBlocks::damped_places() const {
-  std::vector<std::vector<std::size_t>> damped(blocks_.size());  // places within each block
-  for (std::size_t b = 0; b < blocks_.size(); ++b)
-    for (std::size_t i = 0; i < blocks_[b].columns.size(); ++i)
-      if (places_[static_cast<std::size_t>(blocks_[b].columns[i])].front() == b) damped[b].push_back(i);
-  return damped;
-}
-
 RowBlocks RowBlocks::scaled_and_damped(const VectorXd& D, double lambda) const {
-  const std::vector<std::vector<std::size_t>> damped = damped_places();
   std::vector<RowBlock> blocks;
+  for (const RowBlock& block : blocks_)
+    blocks.push_back({block.columns, block.A * D(block.columns).cwiseInverse().asDiagonal()});
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    const RowBlock& block = blocks_[b];
-    const Index rows = block.A.rows();
-    MatrixXd A = MatrixXd::Zero(rows + static_cast<Index>(damped[b].size()), block.A.cols());
-    A.topRows(rows) = block.A * D(block.columns).cwiseInverse().asDiagonal();
-    for (std::size_t i = 0; i < damped[b].size(); ++i)
-      A(rows + static_cast<Index>(i), static_cast<Index>(damped[b][i])) = std::sqrt(lambda);
-    blocks.push_back({block.columns, std::move(A)});
+    std::vector<Index> damped = blocks_[b].columns;
+    std::erase_if(damped, [&](Index k) { return places_[static_cast<std::size_t>(k)].front() != b; });
+    const Index n = static_cast<Index>(damped.size());
+    blocks.push_back({std::move(damped), std::sqrt(lambda) * MatrixXd::Identity(n, n)});
   }
   return {std::move(blocks), columns_};
-}
-
-VectorXd RowBlocks::beside_damping(const VectorXd& b) const {
-  const std::vector<std::vector<std::size_t>> damped = damped_places();
-  VectorXd result = VectorXd::Zero(b.size() + columns_);
-  Index from = 0, to = 0;
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    const Index rows = blocks_[i].A.rows();
-    result.segment(to, rows) = b.segment(from, rows);
-    from += rows, to += rows + static_cast<Index>(damped[i].size());
-  }
-  return result;
 }
 
 }  // namespace mbsopt

@@ -39,14 +39,11 @@ class RowBlocks {
   // Minimises |A d - b| over the free columns, which must be independent. The others of d are zero.
   Eigen::VectorXd solve(const Eigen::VectorXd& b, const std::vector<Eigen::Index>& free) const;
 
-  // The matrix of |A D^-1 e|^2 + lambda |e|^2: sqrt(lambda) e_k is a row below the first block with column k.
+  // The matrix of |A D^-1 e|^2 + lambda |e|^2. The rows sqrt(lambda) e_k come last, one per column. Columns with the
+  // same first block share a block of them, so that elimination still takes the same columns at once.
   RowBlocks scaled_and_damped(const Eigen::VectorXd& D, double lambda) const;
-  // b with zeros for the damping rows.
-  Eigen::VectorXd beside_damping(const Eigen::VectorXd& b) const;
 
  private:
-  std::vector<std::vector<std::size_t>> damped_places() const;
-
   std::vector<RowBlock> blocks_;
   Eigen::Index columns_;
   std::vector<std::vector<std::size_t>> places_;  // per column: the blocks with it
