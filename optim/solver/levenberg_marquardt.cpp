@@ -32,22 +32,10 @@ constexpr double kShrinking = 0.5;
 constexpr double kWeighed = 1e-2;
 constexpr int kWeighings = 100;  // of one step; each lowers its cost, so fewer are harmless
 
-// The weighted residuals of one part and their derivatives, as triangles: |z + J d|^2 = |q + R d|^2 + constant.
-struct Triangle {
-  RowBlock R;
-  VectorXd q;
-};
-
-// J holds the columns of these variables, then z.
-Triangle triangle(std::vector<Index> variables, MatrixXd J) {
-  const Index n = J.cols() - 1, rows = std::min(J.rows(), n);
-  const MatrixXd R = triangular_factor(std::move(J));
-  return {{std::move(variables), R.topLeftCorner(rows, n)}, R.rightCols(1).topRows(rows)};
-}
-
 struct LinearModel {
-  RowBlocks R;
-  VectorXd q, gradient;
+  VectorXd q;
+  RowBlocks R;  // with q a triangle per part, of the weighted residuals: |z + J d|^2 = |q + R d|^2 + constant
+  VectorXd gradient;
   VectorXd D;      // lengths of the columns, or more
   VectorXd units;  // steps are measured by: D, or one length for all
   double size;     // half the weighted sum of squares
@@ -56,7 +44,13 @@ struct LinearModel {
       : LinearModel(point, problem.weights(point.z).cwiseSqrt(), problem.parts) {}
   // w holds square roots of the weights.
   LinearModel(const LeastSquaresPoint& point, const VectorXd& w, const std::vector<Dependence>& parts)
-      : LinearModel(triangles(point, w, parts), point.z_x.cols(), 0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
+      : R(parts.empty() ? triangles(point, w, {{all(point.z.size()), all(point.z_x.cols())}})
+                        : triangles(point, w, parts),
+          point.z_x.cols()),
+        gradient(R.transposed_times(q)),
+        D(R.column_norms()),
+        units(D),
+        size(0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
   MatrixXd squares() const {  // J'J
     MatrixXd H(D.size(), D.size());
     for (Index k = 0; k < D.size(); ++k) H.col(k) = R.transposed_times(R * VectorXd(VectorXd::Unit(D.size(), k)));
@@ -65,41 +59,31 @@ struct LinearModel {
   double promised(const VectorXd& d) const { return 0.5 * (q.squaredNorm() - (q + R * d).squaredNorm()); }
 
  private:
-  LinearModel(std::vector<Triangle> triangles, Index variables, double half_squares)
-      : R(blocks_of(triangles), variables), size(half_squares) {
-    Index rows = 0;
-    for (const Triangle& t : triangles) rows += t.q.size();
-    q.resize(rows);
-    rows = 0;
-    for (const Triangle& t : triangles) q.segment(rows, t.q.size()) = t.q, rows += t.q.size();
-    units = D = R.column_norms();
-    gradient = R.transposed_times(q);
+  static std::vector<Index> all(Index count) {
+    std::vector<Index> indices(static_cast<std::size_t>(count));
+    std::iota(indices.begin(), indices.end(), Index{0});
+    return indices;
   }
 
-  static std::vector<RowBlock> blocks_of(std::vector<Triangle>& triangles) {
+  // Sets q.
+  std::vector<RowBlock> triangles(const LeastSquaresPoint& point, const VectorXd& w,
+                                  const std::vector<Dependence>& parts) {
     std::vector<RowBlock> blocks;
-    for (Triangle& t : triangles) blocks.push_back(std::move(t.R));
-    return blocks;
-  }
-
-  static std::vector<Triangle> triangles(const LeastSquaresPoint& point, const VectorXd& w,
-                                         const std::vector<Dependence>& parts) {
-    std::vector<Triangle> all;
+    q.resize(point.z.size());
+    Index row = 0;
     for (const Dependence& part : parts) {
       const Index n = static_cast<Index>(part.variables.size());
-      MatrixXd J(static_cast<Index>(part.rows.size()), n + 1);
-      J.leftCols(n) = w(part.rows).asDiagonal() * point.z_x(part.rows, part.variables);
-      J.rightCols(1) = w(part.rows).cwiseProduct(point.z(part.rows));
-      all.push_back(triangle(part.variables, std::move(J)));
+      MatrixXd J_z(static_cast<Index>(part.rows.size()), n + 1);
+      J_z.leftCols(n) = w(part.rows).asDiagonal() * point.z_x(part.rows, part.variables);
+      J_z.rightCols(1) = w(part.rows).cwiseProduct(point.z(part.rows));
+      const Index rows = std::min(J_z.rows(), n);
+      const MatrixXd T = triangular_factor(std::move(J_z)).topRows(rows);
+      blocks.push_back({part.variables, T.leftCols(n)});
+      q.segment(row, rows) = T.col(n);
+      row += rows;
     }
-    if (!parts.empty()) return all;
-    MatrixXd J(point.z_x.rows(), point.z_x.cols() + 1);
-    J.leftCols(point.z_x.cols()) = w.asDiagonal() * point.z_x;
-    J.rightCols(1) = w.cwiseProduct(point.z);
-    std::vector<Index> variables(static_cast<std::size_t>(point.z_x.cols()));
-    std::iota(variables.begin(), variables.end(), Index{0});
-    all.push_back(triangle(std::move(variables), std::move(J)));
-    return all;
+    q.conservativeResize(row);
+    return blocks;
   }
 };
 
