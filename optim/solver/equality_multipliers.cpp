@@ -4,9 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
-
-#include "core/expression/counted.hpp"
 
 namespace mbsopt {
 namespace {
@@ -103,24 +100,10 @@ LeastSquaresResult solve_with_equalities(LeastSquaresProblem& problem, const Vec
   for (int k = 0; k < kRounds; ++k) {
     LeastSquaresOptions of_round = options;
     if (k < kLooseRounds) of_round.tolerance = std::max(options.tolerance, std::pow(kFirstTolerance, k + 1));
-    of_round.max_iterations = options.max_iterations - all.iterations;
-    if (options.progress)
-      of_round.progress = [&](LeastSquaresProgress p) {
-        if (k > 0 && p.iteration == 0) return true;
-        p.iteration += all.iterations;
-        return options.progress(p);
-      };
-    LeastSquaresResult found = solve_least_squares(round, all.x, of_round);
-    found.iterations += all.iterations, found.evaluations = round.evaluations;
-    found.failed_evaluations += all.failed_evaluations;
-    if (!all.first_error.empty()) found.first_error = all.first_error;
-    const VectorXd z_initial = k == 0 ? found.z_initial : all.z_initial;
-    all = std::move(found);
-    all.z_initial = z_initial;
+    search_on(round, of_round, all);
+    all.evaluations = round.evaluations;
     if (all.point.z.size() == 0) return all;
-    if (all.status == SolverStatus::iteration_limit)  // of all rounds, not of this one
-      all.message =
-          fmt::format("stopped at the limit of {}{}", counted(options.max_iterations, "iteration"), all.failures());
+    if (all.status == SolverStatus::iteration_limit) all.end_at_limit(options.max_iterations, "iteration");
     round.end(all);
     all.cost_initial = problem.cost(all.z_initial);
     const bool satisfied = round.left() <= kSatisfied;

@@ -8,7 +8,6 @@
 #include <numeric>
 #include <utility>
 
-#include "core/expression/counted.hpp"
 #include "core/linear/dense.hpp"
 #include "optim/solver/bounded_linear_least_squares.hpp"
 
@@ -134,11 +133,9 @@ class Search {
   }
 
   LeastSquaresResult refused_start(const std::string& why) {
-    result_.message = "the start point cannot be evaluated: " + why;
+    result_.refuse_start(why);
     return std::move(result_);
   }
-
-  void end(SolverStatus status, std::string message) { result_.status = status, result_.message = std::move(message); }
 
   // A point at the end of a step, and what its cost gained; promised by the model.
   struct Trial {
@@ -172,15 +169,12 @@ class Search {
   }
 
   bool at_limit() {
-    const auto limit = [&](long most, const char* what) {
-      end(SolverStatus::iteration_limit,
-          fmt::format("stopped at the limit of {}{}", counted(most, what), result_.failures()));
-      return true;
-    };
-    if (result_.iterations == options_.max_iterations) return limit(options_.max_iterations, "iteration");
-    if (options_.max_evaluations && result_.evaluations >= *options_.max_evaluations)
-      return limit(*options_.max_evaluations, "evaluation");
-    return false;
+    if (result_.iterations == options_.max_iterations) {
+      result_.end_at_limit(options_.max_iterations, "iteration");
+    } else if (options_.max_evaluations && result_.evaluations >= *options_.max_evaluations) {
+      result_.end_at_limit(*options_.max_evaluations, "evaluation");
+    }
+    return result_.status == SolverStatus::iteration_limit;
   }
 
   Trial tried(const LinearModel& model, const VectorXd& d) {
@@ -215,12 +209,13 @@ class Search {
   // of the step where the cost is smooth, and with its length at a kink.
   bool is_last(const Trial& trial, const LinearModel& model, const VectorXd& d) {
     if (!trial.point.ok && ++invalid_ == kInvalidSteps) {
-      end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
+      result_.end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
       return true;
     }
     const double length = model.units.cwiseProduct(d).norm(), miss = std::abs(trial.promised - trial.gained);
     if (missed_ > 0 && miss < kSimulationNoise * model.size && miss > std::sqrt(length / missed_) * missed_by_) {
-      end(SolverStatus::converged,
+      result_.end(
+          SolverStatus::converged,
           fmt::format("converged: errors of the simulation change the cost by {:.1g}, more than the {:.1g} that the "
                       "derivatives promise",
                       miss, trial.promised));
@@ -376,20 +371,21 @@ class Search {
     const double left = promise(model);
     result_.promised = model.size > 0 ? left / model.size : 0;
     if (lambda > 1 && left > kSimulationNoise * first_size_)
-      return end(
+      return result_.end(
           SolverStatus::no_progress,
           fmt::format(
               "no further progress: the derivatives promise to lower the cost by {:.2g}, but no step "
               "lowers it{}{}",
               left, result_.failures(),
               problem_.is_integrated ? ". Tighten rtol of the integrator; check the derivatives of C++ code" : ""));
-    end(SolverStatus::converged,
+    result_.end(
+        SolverStatus::converged,
         fmt::format("converged: cost and parameters change by less than {:g} of themselves", options_.tolerance));
   }
 
   bool told(double gradient, double step) {
     if (!options_.progress || options_.progress({result_.iterations, cost_, gradient, step, x_, point_.z})) return true;
-    end(SolverStatus::stopped, "stopped on request");
+    result_.end_on_request();
     return false;
   }
 
@@ -413,6 +409,25 @@ class Search {
 LeastSquaresResult solve_least_squares(LeastSquaresProblem& problem, const VectorXd& x_start,
                                        const LeastSquaresOptions& options) {
   return Search(problem, options).run(x_start);
+}
+
+long search_on(LeastSquaresProblem& round, const LeastSquaresOptions& options, LeastSquaresResult& all) {
+  const bool is_first = all.z_initial.size() == 0;
+  LeastSquaresOptions of_round = options;
+  of_round.max_iterations -= all.iterations;
+  if (options.progress)
+    of_round.progress = [&](LeastSquaresProgress p) {
+      if (!is_first && p.iteration == 0) return true;  // known from before
+      p.iteration += all.iterations;
+      return options.progress(p);
+    };
+  LeastSquaresResult found = solve_least_squares(round, all.x, of_round);
+  const long failed = found.failed_evaluations;
+  found.iterations += all.iterations, found.failed_evaluations += all.failed_evaluations;
+  if (!all.first_error.empty()) found.first_error = std::move(all.first_error);
+  if (!is_first) found.z_initial = std::move(all.z_initial);
+  all = std::move(found);
+  return failed;
 }
 
 }  // namespace mbsopt

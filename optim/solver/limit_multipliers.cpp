@@ -6,8 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "core/expression/counted.hpp"
-
 namespace mbsopt {
 namespace {
 
@@ -123,44 +121,31 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
     LeastSquaresOptions of_round = options;
     of_round.large_residuals = true, of_round.learnt = &learnt;
     of_round.tolerance = std::max(kFinerLimits * options.tolerance, tolerance);
-    of_round.max_iterations = options.max_iterations - all.iterations;
     if (options.max_evaluations) of_round.max_evaluations = std::max(1L, *options.max_evaluations - round.evaluations);
     if (options.progress)
       of_round.progress = [&](LeastSquaresProgress p) {
-        if (k > 0 && p.iteration == 0) return true;
         if (p.x == round.last.x) shown = round.last.cost;
-        p.iteration += all.iterations, p.cost = shown;
+        p.cost = shown;
         return options.progress(p);
       };
-    LeastSquaresResult found = solve_least_squares(round, all.x, of_round);
-    const bool is_blocked =
-        k >= kFirstJudged && found.failed_evaluations > 0 && found.promised > kPromisesMore * of_round.tolerance;
-    found.iterations += all.iterations;
-    found.failed_evaluations += all.failed_evaluations;
-    if (!all.first_error.empty()) found.first_error = all.first_error;
-    const VectorXd z_initial = k == 0 ? found.z_initial : all.z_initial;
-    all = std::move(found);
-    all.z_initial = z_initial, all.evaluations = round.evaluations;
+    const long failed = search_on(round, of_round, all);
+    const bool is_blocked = k >= kFirstJudged && failed > 0 && all.promised > kPromisesMore * of_round.tolerance;
+    all.evaluations = round.evaluations;
     if (all.point.z.size() == 0 || !round.end(all, of_round.tolerance)) return all;
     all.evaluations = round.evaluations;
-    if (all.status == SolverStatus::iteration_limit) {  // of all rounds, not of this one
-      all.message =
-          fmt::format("stopped at the limit of {}{}", counted(options.max_iterations, "iteration"), all.failures());
-      return all;
-    }
-    if (all.status == SolverStatus::stopped) return all;
+    if (all.status == SolverStatus::iteration_limit) all.end_at_limit(options.max_iterations, "iteration");
+    if (all.status == SolverStatus::iteration_limit || all.status == SolverStatus::stopped) return all;
     if (is_blocked && round.left() <= kLimitsHeld) {
-      all.status = SolverStatus::no_progress;
-      all.message = "no further progress: steps lead to where evaluations fail" + all.failures();
+      all.end(SolverStatus::no_progress, "no further progress: steps lead to where evaluations fail" + all.failures());
       return all;
     }
     if (round.left() <= kLimitsHeld && of_round.tolerance <= options.tolerance) return all;
   }
-  all.status = round.missed() > kLimitsHeld ? SolverStatus::infeasible : SolverStatus::no_progress;
-  all.message =
-      round.missed() > kLimitsHeld
-          ? fmt::format("no point near satisfies all limits: one is missed by {:.1g} of its size", round.missed())
-          : "no further progress: the multipliers of the limits do not converge";
+  if (round.missed() > kLimitsHeld)
+    all.end(SolverStatus::infeasible,
+            fmt::format("no point near satisfies all limits: one is missed by {:.1g} of its size", round.missed()));
+  else
+    all.end(SolverStatus::no_progress, "no further progress: the multipliers of the limits do not converge");
   return all;
 }
 

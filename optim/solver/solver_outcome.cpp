@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
+#include "core/expression/counted.hpp"
+
 namespace mbsopt {
 
 std::string_view to_string(SolverStatus status) {
@@ -29,6 +33,18 @@ std::string_view to_string(SolverStatus status) {
 std::string SolverOutcome::failures() const {
   if (failed_evaluations == 0) return {};
   return fmt::format("; {} of {} evaluations failed, first: {}", failed_evaluations, evaluations, first_error);
+}
+
+void SolverOutcome::end(SolverStatus how, std::string words) { status = how, message = std::move(words); }
+
+void SolverOutcome::end_on_request() { end(SolverStatus::stopped, "stopped on request"); }
+
+void SolverOutcome::end_at_limit(long most, std::string_view of) {
+  end(SolverStatus::iteration_limit, fmt::format("stopped at the limit of {}{}", counted(most, of), failures()));
+}
+
+void SolverOutcome::refuse_start(const std::string& why) {
+  end(SolverStatus::failed, "the start point cannot be evaluated: " + why);
 }
 
 }  // namespace mbsopt

@@ -30,6 +30,11 @@ struct SolverOutcome {
   std::string first_error;  // of the first evaluation that failed
 
   std::string failures() const;  // "; 2 of 17 evaluations failed, first: ...", or ""
+
+  void end(SolverStatus how, std::string words);
+  void end_on_request();
+  void end_at_limit(long most, std::string_view of);  // of: "iteration"
+  void refuse_start(const std::string& why);
 };
 
 }  // namespace mbsopt
