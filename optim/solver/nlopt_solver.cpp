@@ -10,12 +10,13 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/expression/counted.hpp"
-#include "optim/solver/evaluated_points.hpp"
+#include "optim/solver/nlp_search.hpp"
 #include "optim/solver/optimality.hpp"
-#include "optim/solver/stationary_point.hpp"
 
 namespace mbsopt {
 namespace {
@@ -25,51 +26,40 @@ using Eigen::VectorXd;
 using VectorIn = Eigen::Map<const VectorXd>;
 using VectorView = Eigen::Map<VectorXd>;
 
-constexpr int kFailuresInARow = 40;  // of local methods, which then end
-constexpr double kFirstStep = 0.1;   // of x, without derivatives
-constexpr double kAcceptable = 100;  // times the tolerance: the factor of Ipopt's acceptable level
-constexpr int kFreshStarts = 2;      // restarts of local methods with gradients, from their best point
-constexpr long kCreeping = 50;       // evaluations in which methods of separable models have to gain
-constexpr double kLeastGain = 0.01;  // part of f; in a narrow valley the gain is less, and slsqp continues
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr int kFailuresInARow = 40;     // of local methods, which then end
+constexpr double kFirstStep = 0.1;      // of x, without derivatives
+constexpr int kFreshStarts = 2;         // restarts of local methods with gradients, from their best point
+constexpr long kCreeping = 50;          // evaluations in which methods of separable models have to gain
+constexpr double kLeastGain = 0.01;     // part of f; in a narrow valley the gain is less, and slsqp continues
 constexpr long kRequestsPerPoint = 20;  // requests of stored points; beyond it a method repeats itself
 
 using Optimizer = std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)>;
 
-enum class Ended { by_itself, converged, stopped, evaluations, iterations, failures, not_a_number, exception };
-
-class Adapter {
+class NloptSearch : private NlpSearch {
  public:
-  Adapter(NonlinearProgram& problem, const NloptMethod& method, const NloptOptions& options, NlpResult& result)
-      : problem_(problem),
+  NloptSearch(NonlinearProgram& problem, const NloptMethod& method, const NloptOptions& options, NlpResult& result)
+      : NlpSearch(problem, options, result),
         method_(method),
         algorithm_(static_cast<nlopt_algorithm>(method.algorithm)),
         options_(options),
-        result_(result),
-        points_(problem, result, options.constraint_tolerance, options.records),
-        solution_(problem, points_, options.tolerance, options.constraint_tolerance),
         wanted_(method.gradients ? Wanted::derivatives : Wanted::values),
         max_evaluations_(options.max_evaluations.value_or(default_max_evaluations(method, problem.variables()))) {
     for (Index i = 0; i < problem.constraints(); ++i) {
       const double lower = problem.c_lower(i), upper = problem.c_upper(i);
       if (lower == upper) {
-        equalities_.push_back({i, 1, lower});
+        equalities_.all.push_back({i, 1, lower});
         continue;
       }
-      if (std::isfinite(lower)) inequalities_.push_back({i, -1, lower});
-      if (std::isfinite(upper)) inequalities_.push_back({i, 1, upper});
+      if (std::isfinite(lower)) inequalities_.all.push_back({i, -1, lower});
+      if (std::isfinite(upper)) inequalities_.all.push_back({i, 1, upper});
     }
   }
 
-  bool start_is_valid(const VectorXd& x) {
-    result_.x = x;
-    const NlpPoint& start = points_.at(x, wanted_);
-    took(start);
-    return start.ok;
-  }
-  bool ended() const { return ended_ != Ended::by_itself; }
-
   void run(const VectorXd& x_start) {
+    result_.x = x_start;
+    const NlpPoint& start = points_.at(x_start, wanted_);
+    took(start);
+    if (!start.ok) return end_refused();
     const unsigned n = static_cast<unsigned>(problem_.variables());
     const bool constrained = problem_.constraints() > 0;
     const bool augmented = constrained && method_.constraints == ConstraintSupport::augmented_lagrangian;
@@ -82,8 +72,8 @@ class Adapter {
       limit(inner.get(), x_start);
       nlopt_set_vector_storage(inner.get(), options_.history);
       if (algorithm_ == NLOPT_G_MLSL) {  // whose search ends when a local one cannot get anywhere
-        nlopt_set_xtol_abs(inner.get(), VectorXd(options_.tolerance * x_start.cwiseAbs().cwiseMax(1)).data());
-        nlopt_set_ftol_abs(inner.get(), 1e-3 * options_.tolerance);
+        nlopt_set_xtol_abs(inner.get(), VectorXd(tolerance_ * x_start.cwiseAbs().cwiseMax(1)).data());
+        nlopt_set_ftol_abs(inner.get(), 1e-3 * tolerance_);
       }
       nlopt_set_local_optimizer(opt_, inner.get());  // a copy
     }
@@ -91,10 +81,10 @@ class Adapter {
     if (method_.random) nlopt_srand(options_.seed);
     result_.algorithm = nlopt_algorithm_name(algorithm_);
     if (augmented) result_.algorithm = std::string(nlopt_algorithm_name(NLOPT_AUGLAG)) + ": " + result_.algorithm;
-    if (ended()) {  // at the start already
+    if (ended_) {  // at the start already
       opt_ = nullptr;
-      say(NLOPT_SUCCESS);
-      if (ended_ == Ended::converged) result_.message = "converged: the start is optimal already";
+      take_solution();
+      if (result_.status == SolverStatus::converged) end_start_optimal();
       return;
     }
     VectorXd x = x_start;
@@ -109,7 +99,11 @@ class Adapter {
     if (const char* const words = nlopt_get_errmsg(opt_)) library_message_ = words;
     opt_ = nullptr;
     if (exception_) std::rethrow_exception(exception_);
-    say(code);
+    take_solution();
+    if (!ended_) end_by_itself(code);
+    if (handed_over_)
+      result_.message += fmt::format("; {} had hardly gained any more in {}, so slsqp went on from its best point",
+                                     method_.name, counted(kCreeping, "evaluation"));
   }
 
  private:
@@ -117,13 +111,17 @@ class Adapter {
     Index constraint;
     double sign, bound;  // sign (c - bound) <= 0, or = 0
   };
+  struct Sides {
+    NloptSearch& search;
+    std::vector<Side> all;
+  };
   using AddConstraints = nlopt_result (*)(nlopt_opt, unsigned, nlopt_mfunc, void*, const double*);
 
   void state_program() {
     nlopt_set_maxeval(opt_, static_cast<int>(std::min(kRequestsPerPoint * max_evaluations_, 2'000'000'000L)));
     nlopt_set_min_objective(opt_, objective, this);
-    add(inequalities_, nlopt_add_inequality_mconstraint, inequality_values);
-    add(equalities_, nlopt_add_equality_mconstraint, equality_values);
+    add(inequalities_, nlopt_add_inequality_mconstraint);
+    add(equalities_, nlopt_add_equality_mconstraint);
   }
 
   // Starts at x, which becomes the end point.
@@ -134,7 +132,7 @@ class Adapter {
       double f = 0;
       code = nlopt_optimize(opt_, x.data(), &f);
       // A line search that stalls with its learnt curvature may progress without it.
-      if (ended() || (creeps_ && !handed_over_) || !stalled() || !(points_.best().f < f_before)) break;
+      if (ended_ || (creeps_ && !handed_over_) || !stalled() || !(points_.best().f < f_before)) break;
       x = points_.best_x();
     }
     return code;
@@ -150,7 +148,7 @@ class Adapter {
 
   // Separable models do not represent a valley that is oblique to the variables.
   void look_for_gain() {
-    if (method_.constraints != ConstraintSupport::inequalities || creeps_ || ended()) return;
+    if (method_.constraints != ConstraintSupport::inequalities || creeps_ || ended_) return;
     if (result_.evaluations < next_look_) return;
     const double f = points_.best().f;
     creeps_ = points_.feasible(points_.best()) && last_look_f_ - f <= kLeastGain * std::abs(f);
@@ -167,9 +165,9 @@ class Adapter {
                            method_.global ? problem_.x_upper.data() : near_bounds(problem_.x_upper, x_start).data());
     const VectorXd size = x_start.cwiseAbs().cwiseMax(1);
     // With gradients, these decide on convergence; the steps only show that nothing moves any more.
-    const VectorXd x_tolerance = (method_.gradients ? 1e-6 : 1.0) * options_.tolerance * size;
+    const VectorXd x_tolerance = (method_.gradients ? 1e-6 : 1.0) * tolerance_ * size;
     nlopt_set_xtol_abs(opt, x_tolerance.data());
-    nlopt_set_ftol_abs(opt, 1e-2 * options_.tolerance * options_.tolerance);
+    nlopt_set_ftol_abs(opt, 1e-2 * tolerance_ * tolerance_);
     if (method_.gradients || method_.global) return;
     VectorXd step = kFirstStep * size;
     for (Index k = 0; k < step.size(); ++k) {
@@ -179,27 +177,28 @@ class Adapter {
     nlopt_set_initial_step(opt, step.data());
   }
 
-  void add(const std::vector<Side>& sides, AddConstraints add_to, nlopt_mfunc values) {
-    if (sides.empty()) return;
-    VectorXd tolerance(static_cast<Index>(sides.size()));
-    for (std::size_t j = 0; j < sides.size(); ++j)
-      tolerance(static_cast<Index>(j)) = options_.constraint_tolerance * problem_.c_scale(sides[j].constraint);
-    add_to(opt_, static_cast<unsigned>(sides.size()), values, this, tolerance.data());
+  void add(Sides& sides, AddConstraints add_to) {
+    if (sides.all.empty()) return;
+    VectorXd tolerance(static_cast<Index>(sides.all.size()));
+    for (Index j = 0; j < tolerance.size(); ++j)
+      tolerance(j) =
+          options_.constraint_tolerance * problem_.c_scale(sides.all[static_cast<std::size_t>(j)].constraint);
+    add_to(opt_, static_cast<unsigned>(sides.all.size()), constraint_values, &sides, tolerance.data());
   }
 
   // No exception may pass through NLopt, which is C.
   template <class F>
-  static void guarded(Adapter& self, F&& evaluate) {
+  static void guarded(NloptSearch& self, F&& evaluate) {
     try {
       evaluate();
     } catch (...) {
       self.exception_ = std::current_exception();
-      self.end(Ended::exception);
+      self.force_stop();
     }
   }
 
   static double objective(unsigned n, const double* x, double* f_x, void* data) {
-    Adapter& self = *static_cast<Adapter*>(data);
+    NloptSearch& self = *static_cast<NloptSearch*>(data);
     double f = 0;
     guarded(self, [&] {
       const NlpPoint& point = self.at(VectorIn(x, n));
@@ -208,22 +207,15 @@ class Adapter {
     });
     return f;
   }
-  static void inequality_values(unsigned m, double* values, unsigned n, const double* x, double* c_x, void* data) {
-    Adapter& self = *static_cast<Adapter*>(data);
-    self.constraint_values(self.inequalities_, m, values, n, x, c_x);
-  }
-  static void equality_values(unsigned m, double* values, unsigned n, const double* x, double* c_x, void* data) {
-    Adapter& self = *static_cast<Adapter*>(data);
-    self.constraint_values(self.equalities_, m, values, n, x, c_x);
-  }
-  void constraint_values(const std::vector<Side>& sides, unsigned m, double* values, unsigned n, const double* x,
-                         double* c_x) {
+  static void constraint_values(unsigned m, double* values, unsigned n, const double* x, double* c_x, void* data) {
+    const Sides& sides = *static_cast<const Sides*>(data);
+    NloptSearch& self = sides.search;
     std::fill(values, values + m, 0);
-    guarded(*this, [&] {
-      const NlpPoint& point = at(VectorIn(x, n));
+    guarded(self, [&] {
+      const NlpPoint& point = self.at(VectorIn(x, n));
       for (unsigned j = 0; j < m; ++j) {
-        const Side& side = sides[j];
-        const double scale = side.sign * problem_.c_scale(side.constraint);
+        const Side& side = sides.all[j];
+        const double scale = side.sign * self.problem_.c_scale(side.constraint);
         values[j] = scale * (point.c(side.constraint) - side.bound);
         if (c_x) VectorView(c_x + j * n, n) = scale * point.c_x.row(side.constraint);
       }
@@ -232,8 +224,10 @@ class Adapter {
 
   // The point for NLopt, or its substitute if it cannot be evaluated.
   const NlpPoint& at(const VectorXd& x) {
-    if (!x.allFinite()) end(Ended::not_a_number);
-    if (ended()) return last_good_;
+    if (!x.allFinite())
+      end(SolverStatus::failed,
+          fmt::format("{} asked for a point that is not a number{}", method_.name, result_.failures()));
+    if (ended_) return last_good_;
     const NlpPoint& point = points_.at(x, wanted_);
     if (points_.is_new()) took(point);
     if (point.ok) return point;
@@ -245,40 +239,32 @@ class Adapter {
     if (point.ok) {
       f_worst_ = last_good_x_.size() > 0 ? std::max(f_worst_, point.f) : point.f;
       last_good_ = point, last_good_x_ = points_.x();
-      look_at_optimality(point);
+      if (is_local_with_gradients() && solution_.look(point) <= tolerance_ && !ended_) end_optimal(), force_stop();
       if (points_.is_better()) took_better(point);
     } else if (point.abandoned) {
-      end(Ended::stopped);
+      stop_on_request();
     } else if (!method_.global && points_.failed_in_a_row() >= kFailuresInARow) {
-      end(Ended::failures);
+      end(SolverStatus::no_progress,
+          fmt::format("no further progress: {} in a row failed, the last: {}",
+                      counted(points_.failed_in_a_row(), "evaluation"), points_.last_error()));
     }
-    if (result_.evaluations >= max_evaluations_) end(Ended::evaluations);
+    if (result_.evaluations >= max_evaluations_) end_at_limit(max_evaluations_, "evaluation");
     look_for_gain();
   }
 
   void took_better(const NlpPoint& point) {
-    const bool is_start = result_.evaluations == 1;
-    if (!is_start) ++result_.iterations;
-    const double distance = method_.gradients ? optimality(problem_, points_.x(), point) : kUnknown;
-    const NlpProgress progress{result_.iterations, point.f, problem_.violation(point.c), distance, points_.x()};
-    if (options_.progress && !options_.progress(progress)) end(Ended::stopped);
-    if (options_.max_iterations && result_.iterations >= *options_.max_iterations) end(Ended::iterations);
+    if (result_.evaluations > 1) ++result_.iterations;  // not the start
+    if (!told(point, method_.gradients ? optimality(problem_, points_.x(), point) : kUnknown)) stop_on_request();
+    if (options_.max_iterations && result_.iterations >= *options_.max_iterations)
+      end_at_limit(*options_.max_iterations, "iteration");
   }
+
+  bool is_local_with_gradients() const { return method_.gradients && !method_.global; }
 
   bool stalled() {
-    if (!method_.gradients || method_.global) return false;
-    keep_solution();
-    return points_.feasible(result_.point) &&
-           optimality(problem_, result_.x, result_.point) > kAcceptable * options_.tolerance;
-  }
-
-  void look_at_optimality(const NlpPoint& point) {
-    if (!method_.gradients || method_.global) return;
-    if (solution_.look(point) <= options_.tolerance) end(Ended::converged);
-  }
-  void keep_solution() {
-    if (points_.have_best()) result_.x = points_.best_x(), result_.point = points_.best();
-    if (solution_.found()) result_.x = solution_.x(), result_.point = solution_.point();
+    if (!is_local_with_gradients()) return false;
+    take_solution();
+    return points_.feasible(result_.point) && optimality(problem_, result_.x, result_.point) > kAcceptable * tolerance_;
   }
 
   // If a point fails, its function value is high, so that the method returns. With gradients it rises along the step by
@@ -297,113 +283,71 @@ class Adapter {
     stand_in_.f_x = 2 * rise / std::max(d.squaredNorm(), std::numeric_limits<double>::min()) * d;
   }
 
-  // The first reason counts.
-  void end(Ended how) {
-    if (!ended()) ended_ = how;
+  void force_stop() {
+    ended_ = true;
     if (opt_) nlopt_force_stop(opt_);
   }
-
-  std::string limit_words() const {
-    return ended_ == Ended::iterations ? counted(*options_.max_iterations, "iteration")
-                                       : counted(max_evaluations_, "evaluation");
+  // The first reason counts.
+  void end(SolverStatus status, std::string words) {
+    if (!ended_) result_.end(status, std::move(words));
+    force_stop();
+  }
+  void stop_on_request() {
+    if (!ended_) result_.end_on_request();
+    force_stop();
+  }
+  void end_at_limit(long most, const char* of) {
+    if (!ended_ && method_.global) end_searched(counted(most, of));
+    if (!ended_) result_.end_at_limit(most, of);
+    force_stop();
   }
 
-  void say(nlopt_result code) {
-    keep_solution();
-    const std::string failures = result_.failures();
-    switch (ended_) {
-      case Ended::converged:
-        return put(SolverStatus::converged, "converged: the optimality conditions hold");
-      case Ended::stopped:
-        return put(SolverStatus::stopped, "stopped on request");
-      case Ended::iterations:
-      case Ended::evaluations:
-        if (method_.global) return say_searched();
-        return put(SolverStatus::iteration_limit, "stopped at the limit of " + limit_words() + failures);
-      case Ended::failures:
-        return put(SolverStatus::no_progress,
-                   fmt::format("no further progress: {} in a row failed, the last: {}",
-                               counted(points_.failed_in_a_row(), "evaluation"), points_.last_error()));
-      case Ended::not_a_number:
-        return put(SolverStatus::failed,
-                   fmt::format("{} asked for a point that is not a number{}", method_.name, failures));
-      case Ended::exception:
-      case Ended::by_itself:
-        break;
-    }
-    say_by_itself(code, failures);
-  }
-
-  void say_searched() {
+  void end_searched(const std::string& limit) {
+    take_solution();
     if (!points_.feasible(result_.point))
-      return put(SolverStatus::infeasible,
+      return end(SolverStatus::infeasible,
                  fmt::format("infeasible: none of {} satisfies the constraints; relax them, or search longer "
                              "(max_evaluations){}",
                              counted(result_.evaluations, "point"), result_.failures()));
-    put(SolverStatus::searched,
-        fmt::format("searched to the given limit, {}: the best point found, which a local method may improve{}",
-                    limit_words(), result_.failures()));
+    end(SolverStatus::searched,
+        fmt::format("searched to the given limit, {}: the best point found, which a local method may improve{}", limit,
+                    result_.failures()));
   }
 
-  void say_by_itself(nlopt_result code, const std::string& failures) {
-    if (code == NLOPT_OUT_OF_MEMORY) return put(SolverStatus::failed, "not enough memory");
+  void end_by_itself(nlopt_result code) {
+    const std::string failures = result_.failures(), library = library_message_.empty() ? "" : ": " + library_message_;
+    if (code == NLOPT_OUT_OF_MEMORY) return end(SolverStatus::failed, "not enough memory");
     if (code == NLOPT_INVALID_ARGS)
-      return put(SolverStatus::failed, fmt::format("{} refused the problem{}{}", method_.name,
-                                                   library_message_.empty() ? "" : ": ", library_message_));
-    if (!points_.feasible(result_.point))
-      return put(
-          SolverStatus::infeasible,
-          "infeasible: no point near the last one satisfies the constraints; relax them or start elsewhere" + failures);
+      return end(SolverStatus::failed, fmt::format("{} refused the problem{}", method_.name, library));
+    if (!points_.feasible(result_.point)) return end_infeasible();
     if (code == NLOPT_MAXEVAL_REACHED) {  // requests of known points reached the limit
-      if (method_.global) return say_searched();
-      return put(SolverStatus::no_progress,
+      if (method_.global) return end_searched(counted(max_evaluations_, "evaluation"));
+      return end(SolverStatus::no_progress,
                  "no further progress: the method returns to points that it has already tried" + failures);
     }
-    if (method_.gradients && !method_.global) {
-      const double distance = optimality(problem_, result_.x, result_.point);
-      if (distance <= kAcceptable * options_.tolerance)
-        return put(SolverStatus::converged,
-                   "converged: the objective does not change any more, and the optimality conditions hold to the "
-                   "accuracy of its derivatives");
-      return put(
-          SolverStatus::no_progress,
-          fmt::format(
-              "no further progress: no step lowers the objective any more, but the optimality conditions hold "
-              "to {:.1e} only, not to {:g}; try tighter simulation tolerances, or a larger optimiser tolerance{}",
-              distance, options_.tolerance, failures));
-    }
+    if (is_local_with_gradients())
+      return end_settled(optimality(problem_, result_.x, result_.point), "no step lowers the objective any more");
     if (code == NLOPT_ROUNDOFF_LIMITED)
-      return put(SolverStatus::converged, "converged: the steps are down to the accuracy of the objective" + failures);
+      return end(SolverStatus::converged, "converged: the steps are down to the accuracy of the objective" + failures);
     if (code < 0 && method_.global)  // mlsl: one of its local searches
-      return put(SolverStatus::searched,
+      return end(SolverStatus::searched,
                  fmt::format("searched until nothing got any better, {}: the best point found{}",
                              counted(result_.evaluations, "evaluation"), failures));
     if (code < 0)
-      return put(SolverStatus::failed, fmt::format("{} failed ({}{}{}){}", method_.name, nlopt_result_to_string(code),
-                                                   library_message_.empty() ? "" : ": ", library_message_, failures));
-    put(SolverStatus::converged,
+      return end(SolverStatus::failed,
+                 fmt::format("{} failed ({}{}){}", method_.name, nlopt_result_to_string(code), library, failures));
+    end(SolverStatus::converged,
         "converged: the steps, or the changes of the objective, are below the tolerance" + failures);
   }
 
-  void put(SolverStatus status, std::string words) {
-    result_.status = status, result_.message = std::move(words);
-    if (handed_over_)
-      result_.message += fmt::format("; {} had hardly gained any more in {}, so slsqp went on from its best point",
-                                     method_.name, counted(kCreeping, "evaluation"));
-  }
-
-  NonlinearProgram& problem_;
   const NloptMethod& method_;
   const nlopt_algorithm algorithm_;
   const NloptOptions& options_;
-  NlpResult& result_;
-  EvaluatedPoints points_;
-  StationaryPoint solution_;
   const Wanted wanted_;
   const long max_evaluations_;
-  std::vector<Side> inequalities_, equalities_;
+  Sides inequalities_{*this, {}}, equalities_{*this, {}};
   nlopt_opt opt_ = nullptr;  // while it runs
-  Ended ended_ = Ended::by_itself;
+  bool ended_ = false;
   std::exception_ptr exception_;
   std::string library_message_;
   NlpPoint last_good_, stand_in_;
@@ -431,13 +375,7 @@ NlpResult solve_with_nlopt(NonlinearProgram& problem, const VectorXd& x_start, c
   if (method->global && !(problem.x_lower.allFinite() && problem.x_upper.allFinite()))
     throw std::invalid_argument(fmt::format("'{}' searches between bounds; every variable needs both", options.method));
   NlpResult result;
-  Adapter adapter(problem, *method, options, result);
-  if (!adapter.start_is_valid(x_start)) {
-    result.message = "the start point cannot be evaluated: " + result.first_error;
-    result.point.ok = false;
-    return result;
-  }
-  adapter.run(x_start);
+  NloptSearch(problem, *method, options, result).run(x_start);
   return result;
 }
 
