@@ -29,12 +29,6 @@ struct Multiplier {
   double slack;
 };
 
-VectorXd on(const std::vector<Index>& passive, const MatrixXd& A, const VectorXd& b) {
-  MatrixXd part(A.rows(), static_cast<Index>(passive.size()));
-  for (std::size_t j = 0; j < passive.size(); ++j) part.col(static_cast<Index>(j)) = A.col(passive[j]);
-  return least_squares(part, b);
-}
-
 }  // namespace
 
 VectorXd non_negative_least_squares(const MatrixXd& A, const VectorXd& b) {
@@ -52,33 +46,31 @@ VectorXd non_negative_least_squares(const MatrixXd& A, const VectorXd& b) {
     }
     if (entering < 0) break;
     passive.push_back(entering);
-    VectorXd s = on(passive, A, b);
+    VectorXd s = least_squares(A(Eigen::all, passive), b);
     if (s(s.size() - 1) <= 0) {  // by rounding: its column is one of those already in
       passive.pop_back();
       tried[static_cast<std::size_t>(entering)] = true;
       continue;
     }
     while (s.size() > 0 && s.minCoeff() <= 0) {
+      const VectorXd from = z(passive);
       double part = 1;  // of the way to s that keeps z >= 0
-      for (std::size_t j = 0; j < passive.size(); ++j) {
-        const double from = z(passive[j]), to = s(static_cast<Index>(j));
-        if (to <= 0) part = std::min(part, from / (from - to));
-      }
+      for (Index j = 0; j < s.size(); ++j)
+        if (s(j) <= 0) part = std::min(part, from(j) / (from(j) - s(j)));
+      z(passive) += part * (s - from);
       std::vector<Index> kept;
-      for (std::size_t j = 0; j < passive.size(); ++j) {
-        double& value = z(passive[j]);
-        const double to = s(static_cast<Index>(j));
-        value += part * (to - value);
-        if (to <= 0 && value <= 1e-15 * std::abs(to) + std::numeric_limits<double>::min())
-          value = 0;
+      for (Index j = 0; j < s.size(); ++j) {
+        const Index k = passive[static_cast<std::size_t>(j)];
+        if (s(j) <= 0 && z(k) <= 1e-15 * std::abs(s(j)) + std::numeric_limits<double>::min())
+          z(k) = 0;
         else
-          kept.push_back(passive[j]);
+          kept.push_back(k);
       }
       if (kept.size() == passive.size()) break;
       passive = std::move(kept);
-      s = on(passive, A, b);
+      s = least_squares(A(Eigen::all, passive), b);
     }
-    for (std::size_t j = 0; j < passive.size(); ++j) z(passive[j]) = std::max(0.0, s(static_cast<Index>(j)));
+    z(passive) = s.cwiseMax(0);
     std::fill(tried.begin(), tried.end(), false);
   }
   return z;
