@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "optim/design/tracked_squares.hpp"
 #include "optim/design/true_limits.hpp"
@@ -15,18 +16,25 @@
 namespace mbsopt {
 namespace {
 
-NlpResult solved_with_ipopt(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
-                            const SearchHooks& hooks) {
-  IpoptOptions solver;
+// The options of every solver of nonlinear programs.
+template <class Options>
+Options common_options(const OptimizerSpec& spec, const SearchHooks& hooks) {
+  Options solver;
   solver.tolerance = spec.tolerance;
   solver.constraint_tolerance = kConstraintTolerance;
-  solver.max_iterations = static_cast<int>(spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations));
   solver.max_evaluations = spec.max_evaluations;
-  if (spec.lbfgs_history) solver.history = static_cast<int>(*spec.lbfgs_history);
-  solver.second_order = spec.hessian != "lbfgs";
-  solver.gauss_newton = spec.hessian == "gauss_newton";
+  if (spec.lbfgs_history) solver.history = static_cast<decltype(solver.history)>(*spec.lbfgs_history);
   solver.progress = hooks.progress;
   solver.records = hooks.records;
+  return solver;
+}
+
+NlpResult solved_with_ipopt(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
+                            const SearchHooks& hooks) {
+  IpoptOptions solver = common_options<IpoptOptions>(spec, hooks);
+  solver.max_iterations = static_cast<int>(spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations));
+  solver.second_order = spec.hessian != "lbfgs";
+  solver.gauss_newton = spec.hessian == "gauss_newton";
   solver.warm_start = spec.warm_start;
   NlpResult solution = solve_with_ipopt(program, x_start, solver);
   if (solver.second_order)
@@ -37,19 +45,13 @@ NlpResult solved_with_ipopt(DesignProgram& program, const Eigen::VectorXd& x_sta
 
 NlpResult solved_with_nlopt(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
                             const SearchHooks& hooks, std::optional<long>& seed) {
-  NloptOptions solver;
+  NloptOptions solver = common_options<NloptOptions>(spec, hooks);
   solver.method = spec.type;
-  solver.tolerance = spec.tolerance;
-  solver.constraint_tolerance = kConstraintTolerance;
-  solver.max_evaluations = spec.max_evaluations;
   solver.max_iterations = spec.max_iterations;
-  if (spec.lbfgs_history) solver.history = static_cast<unsigned>(*spec.lbfgs_history);
   if (find_nlopt_method(spec.type)->random) {
     if (!seed) seed = spec.seed.value_or(drawn_seed());
     solver.seed = static_cast<std::uint32_t>(*seed);
   }
-  solver.progress = hooks.progress;
-  solver.records = hooks.records;
   return solve_with_nlopt(program, x_start, solver);
 }
 
@@ -98,15 +100,6 @@ SearchHooks continued(const SearchHooks& hooks, int iterations) {
   return later;
 }
 
-// Takes `found`, unless it is worse, with the counts of both.
-void take(const NlpResult& found, bool is_worse, NlpResult& solution) {
-  const NlpResult before = solution;
-  if (!is_worse) solution = found;
-  solution.iterations = found.iterations + before.iterations;
-  solution.evaluations = found.evaluations + before.evaluations;
-  solution.failed_evaluations = found.failed_evaluations + before.failed_evaluations;
-}
-
 // Solves again within the moved bounds, from the last solution. If the method stalls there, it solves from the first
 // start.
 void solve_again(const DesignSpec& spec, DesignProgram& program, const CaseEvaluator& evaluator,
@@ -114,14 +107,20 @@ void solve_again(const DesignSpec& spec, DesignProgram& program, const CaseEvalu
   for (const bool from_solution : {true, false}) {
     OptimizerSpec rest = remaining(spec.optimizer, solution);
     if (!may_go_on(rest)) {
-      solution.status = SolverStatus::iteration_limit;
-      solution.message = "stopped at the limit of iterations or evaluations, before the limits held for true extremes";
-      return;
+      return solution.end(
+          SolverStatus::iteration_limit,
+          "stopped at the limit of iterations or evaluations, before the limits held for true extremes");
     }
     rest.warm_start = from_solution || rest.warm_start;
-    const NlpResult found = solved_once(program, evaluator, from_solution ? solution.x : x_start, rest,
-                                        continued(hooks, solution.iterations), result);
-    take(found, !from_solution && !is_an_improvement(program, found, solution), solution);
+    NlpResult found = solved_once(program, evaluator, from_solution ? solution.x : x_start, rest,
+                                  continued(hooks, solution.iterations), result);
+    const bool is_worse = !from_solution && !is_an_improvement(program, found, solution);
+    found.iterations += solution.iterations, found.evaluations += solution.evaluations;
+    found.failed_evaluations += solution.failed_evaluations;
+    if (is_worse)
+      solution.take_counts(found);
+    else
+      solution = std::move(found);
     if (solution.status != SolverStatus::no_progress && solution.status != SolverStatus::infeasible) return;
   }
 }
@@ -139,15 +138,6 @@ Eigen::VectorXi binding_sides(const OptimizerSpec& spec, const DesignProgram& pr
   return sides;
 }
 
-// Goes back to the solution `before`, whose limits held, with the counts of both.
-void go_back(const NlpResult& before, NlpResult& solution) {
-  const NlpResult later = solution;
-  solution = before;
-  solution.iterations = later.iterations, solution.evaluations = later.evaluations;
-  solution.failed_evaluations = later.failed_evaluations;
-  if (later.status == SolverStatus::stopped) solution.status = later.status, solution.message = later.message;
-}
-
 }  // namespace
 
 LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, CaseEvaluator& evaluator,
@@ -162,11 +152,13 @@ LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, 
     const TrueLimits limits_before = limits;
     if (!limits.move(program, solution.point.c, rounds.true_values, binding_sides(spec.optimizer, program, solution)))
       break;
-    const NlpResult before = solution;
+    NlpResult before = solution;
     solve_again(spec, program, evaluator, x_start, hooks, solution, result);
     const bool as_good = solution.status == SolverStatus::converged || solution.status == before.status;
     if (as_good || !limits_before.hold(program, rounds.true_values)) continue;
-    go_back(before, solution);
+    before.take_counts(solution);  // the limits held there
+    if (solution.status == SolverStatus::stopped) before.end_on_request();
+    solution = std::move(before);
     limits = limits_before;
     break;
   }

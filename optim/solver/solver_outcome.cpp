@@ -35,6 +35,10 @@ std::string SolverOutcome::failures() const {
   return fmt::format("; {} of {} evaluations failed, first: {}", failed_evaluations, evaluations, first_error);
 }
 
+void SolverOutcome::take_counts(const SolverOutcome& of) {
+  iterations = of.iterations, evaluations = of.evaluations, failed_evaluations = of.failed_evaluations;
+}
+
 void SolverOutcome::end(SolverStatus how, std::string words) { status = how, message = std::move(words); }
 
 void SolverOutcome::end_on_request() { end(SolverStatus::stopped, "stopped on request"); }

@@ -31,6 +31,8 @@ struct SolverOutcome {
 
   std::string failures() const;  // "; 2 of 17 evaluations failed, first: ...", or ""
 
+  void take_counts(const SolverOutcome& of);  // of iterations and evaluations
+
   void end(SolverStatus how, std::string words);
   void end_on_request();
   void end_at_limit(long most, std::string_view of);  // of: "iteration"
