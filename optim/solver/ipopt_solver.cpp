@@ -170,9 +170,10 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   // Returns whether the start is feasible and the objective falls nowhere within the bounds. The barrier would only
   // lead away.
   bool start_is_optimal() {
-    if (!(solution_.distance() <= tolerance_)) return false;
+    const double distance = look(*point_);
+    if (distance > tolerance_) return false;
     take_solution();
-    told(*point_, solution_.distance());
+    told(*point_, distance);
     end_start_optimal();
     return true;
   }
@@ -299,7 +300,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   // Interior points may leave the bounds by a rounding error; EvaluatedPoints moves them back.
   bool evaluate(const Eigen::VectorXd& x) {
     point_ = &points_.at(x, Wanted::derivatives);
-    if (points_.is_new() && point_->ok) solution_.look(*point_);
+    if (points_.is_new() && point_->ok) look(*point_);
     return point_->ok;
   }
 

@@ -239,7 +239,7 @@ class NloptSearch : private NlpSearch {
     if (point.ok) {
       f_worst_ = last_good_x_.size() > 0 ? std::max(f_worst_, point.f) : point.f;
       last_good_ = point, last_good_x_ = points_.x();
-      if (is_local_with_gradients() && solution_.look(point) <= tolerance_ && !ended_) end_optimal(), force_stop();
+      if (is_local_with_gradients() && look(point) <= tolerance_ && !ended_) end_optimal(), force_stop();
       if (points_.is_better()) took_better(point);
     } else if (point.abandoned) {
       stop_on_request();

@@ -4,7 +4,16 @@
 
 #include <cmath>
 
+#include "optim/solver/optimality.hpp"
+
 namespace mbsopt {
+
+double NlpSearch::look(const NlpPoint& point) {
+  if (!points_.feasible(point) || !as_good_as_best(point.f)) return std::numeric_limits<double>::infinity();
+  const double distance = optimality(problem_, points_.x(), point);
+  if (!has_solution() || distance < distance_) solution_x_ = points_.x(), solution_ = point, distance_ = distance;
+  return distance;
+}
 
 bool NlpSearch::told(const NlpPoint& point, double distance) const {
   return !progress_ || progress_({result_.iterations, point.f, problem_.violation(point.c), distance, points_.x()});
@@ -12,7 +21,7 @@ bool NlpSearch::told(const NlpPoint& point, double distance) const {
 
 void NlpSearch::take_solution() {
   if (points_.have_best()) result_.x = points_.best_x(), result_.point = points_.best();
-  if (solution_.found()) result_.x = solution_.x(), result_.point = solution_.point();
+  if (has_solution()) result_.x = solution_x_, result_.point = solution_;
 }
 
 void NlpSearch::end_refused() {

@@ -1,13 +1,18 @@
-// The base of Ipopt's and NLopt's adapters: the points of a search, its result among them, and the words of its end.
+// The base of Ipopt's and NLopt's adapters: the points of a search, its solution among them, and the words of its end.
+//
+// A point that violates a constraint by its tolerance may have a lower objective, and noise moves the objective by its
+// own size. So among the feasible points whose objective is the lowest one within the tolerances, the most stationary
+// one is the solution (optimality.hpp).
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <string>
 
 #include "optim/solver/evaluated_points.hpp"
 #include "optim/solver/nonlinear_program.hpp"
-#include "optim/solver/stationary_point.hpp"
 
 namespace mbsopt {
 
@@ -24,8 +29,12 @@ class NlpSearch {
         tolerance_(options.tolerance),
         progress_(options.progress),
         points_(problem, result, options.constraint_tolerance, options.records),
-        solution_(problem, points_, options.tolerance, options.constraint_tolerance) {}
+        margin_(std::max(options.tolerance, 10 * options.constraint_tolerance)) {}
 
+  // The point is the one of the last call of points_.at(), with derivatives. Returns its optimality if it may be the
+  // solution, else infinity.
+  double look(const NlpPoint& point);
+  bool has_solution() const { return solution_x_.size() > 0 && as_good_as_best(solution_.f); }
   // Reports the last point of points_. Returns whether the search goes on.
   bool told(const NlpPoint& point, double distance) const;
   // The result becomes the solution. If there is none, it becomes the best point.
@@ -44,7 +53,14 @@ class NlpSearch {
   const double tolerance_;
   const std::function<bool(const NlpProgress&)>& progress_;
   EvaluatedPoints points_;
-  StationaryPoint solution_;
+
+ private:
+  bool as_good_as_best(double f) const { return (f - points_.best().f) * problem_.f_scale <= margin_; }
+
+  const double margin_;  // of the scaled objective
+  Eigen::VectorXd solution_x_;
+  NlpPoint solution_;
+  double distance_ = std::numeric_limits<double>::infinity();  // of the solution
 };
 
 }  // namespace mbsopt
