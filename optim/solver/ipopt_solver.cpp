@@ -7,14 +7,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <new>
+#include <utility>
 #include <vector>
 
 #include "core/expression/counted.hpp"
 #include "core/linear/dense.hpp"
 #include "optim/solver/nlp_search.hpp"
 #include "optim/solver/optimality.hpp"
-#include "optim/solver/search_watch.hpp"
 #include "optim/solver/secant_curvature.hpp"
 
 namespace mbsopt {
@@ -35,6 +36,20 @@ void require_memory() {
   ::operator delete(::operator new(kOfMumps));
 }
 
+// Why a round ends before Ipopt would end it.
+//   optimal     an iterate is stationary to the tolerance, by the measure of all methods (optimality.hpp)
+//   stalled     ten iterations have changed f by noise only, which a line search would try to lower without end
+//   creeping    20 iterations have gained less than 1 % of f, none of them anywhere near a stationary point; without
+//               constraints only, under which f tells less
+enum class SearchEnd { none, optimal, stalled, creeping };
+constexpr int kStalled = 10, kCreeping = 20;  // iterations
+
+struct Iterate {
+  Eigen::VectorXd x;
+  double f = 0;         // scaled: its size and gradient about 1 at the start
+  double distance = 0;  // optimality
+};
+
 class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
  public:
   IpoptSearch(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options, NlpResult& result)
@@ -42,7 +57,6 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
         x_start_(x_start),
         options_(options),
         secants_(1 / problem.f_scale),
-        watch_(options.tolerance, problem.constraints() == 0),
         second_order_(options.second_order) {
     result_.x = x_start;
   }
@@ -261,7 +275,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     x_start_ = points_.best_x();
     iterations_before_ = result_.iterations;
     if (end_ == SearchEnd::creeping) second_order_ = false, left_newton_at_ = result_.iterations;
-    watch_.start_afresh(), end_ = SearchEnd::none;
+    recent_.clear(), end_ = SearchEnd::none;
     ++round_;
   }
 
@@ -276,15 +290,15 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     take_solution();
     const double distance = optimality(problem_, result_.x, result_.point);
     if (end_ == SearchEnd::stalled)
-      end_settled(distance, fmt::format("in {} the objective has changed by no more than noise",
-                                        counted(SearchWatch::kStalled, "iteration")));
+      end_settled(distance,
+                  fmt::format("in {} the objective has changed by no more than noise", counted(kStalled, "iteration")));
     const SolverStatus status = result_.status;
     if (status == SolverStatus::converged && distance > tolerance_)
       result_.message += fmt::format(" (as Ipopt measures them; by the measure of all methods to {:.1e})", distance);
     if (left_newton_at_ > 0)
       result_.message +=
           fmt::format("; by L-BFGS from iteration {} on, since steps by Hessians gained less than 1 % in {}",
-                      left_newton_at_, counted(SearchWatch::kCreeping, "iteration"));
+                      left_newton_at_, counted(kCreeping, "iteration"));
     if (!best_is_feasible()) return;
     if ((status == SolverStatus::no_progress || status == SolverStatus::infeasible) &&
         distance <= kAcceptable * tolerance_) {
@@ -305,12 +319,44 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   }
 
   // Ipopt would continue. A search without progress starts again, a few times. If Newton steps progress slowly, BFGS
-  // replaces them.
+  // replaces them. The iterate is feasible.
   void look_at_iterate(double distance) {
-    end_ = watch_.look({iterate_, point_->f * problem_.f_scale, distance});
-    if (end_ == SearchEnd::creeping && (round_ >= kFreshStarts || !second_order_)) end_ = SearchEnd::none;
-    if (end_ == SearchEnd::optimal) final_ = iterate_;
-    if (end_ == SearchEnd::stalled) final_ = watch_.most_stationary().x;
+    if (distance <= tolerance_) {
+      end_ = SearchEnd::optimal, final_ = iterate_;
+      return;
+    }
+    recent_.push_back({iterate_, point_->f * problem_.f_scale, distance});
+    if (recent_.size() > kCreeping + 1) recent_.pop_front();
+    if (is_stalled()) {
+      const auto nearest = std::ranges::min_element(last(kStalled), recent_.cend(), {}, &Iterate::distance);
+      end_ = SearchEnd::stalled, final_ = nearest->x;
+    } else if (second_order_ && round_ < kFreshStarts && problem_.constraints() == 0 && is_creeping()) {
+      end_ = SearchEnd::creeping;
+    }
+  }
+
+  // The first of the last count + 1 iterates; there must be so many.
+  std::deque<Iterate>::const_iterator last(int count) const { return recent_.end() - (count + 1); }
+
+  // The least and the largest f of the last count + 1 iterates.
+  std::pair<double, double> range_of_f(int count) const {
+    const auto [least, most] = std::ranges::minmax_element(last(count), recent_.end(), {}, &Iterate::f);
+    return {least->f, most->f};
+  }
+
+  bool is_stalled() const {
+    constexpr double kNoise = 1e-2;  // times the tolerance, relative to f
+    if (recent_.size() <= kStalled) return false;
+    const auto [least, most] = range_of_f(kStalled);
+    return most - least <= std::max(tolerance_ * tolerance_, kNoise * tolerance_ * std::abs(most));
+  }
+
+  bool is_creeping() const {
+    constexpr double kLittle = 0.01, kBeside = 0.1;
+    if (recent_.size() <= kCreeping) return false;
+    const auto [least, most] = range_of_f(kCreeping);
+    return most - least <= kLittle * std::abs(most) &&
+           std::ranges::all_of(recent_, [](const Iterate& i) { return i.distance > kBeside; });
   }
 
   // The Hessian of f. If it is not positive definite and there are no constraints, BFGS replaces it: negative curvature
@@ -352,7 +398,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   const NlpPoint* point_ = nullptr;  // the last one
   Eigen::VectorXd final_, iterate_, hessians_x_;
   NlpHessians hessians_;
-  SearchWatch watch_;
+  std::deque<Iterate> recent_;       // of this round, oldest first
   SearchEnd end_ = SearchEnd::none;  // of this round, if it ends here
   bool second_order_, out_of_evaluations_ = false;
   int round_ = 0, iterations_before_ = 0;
