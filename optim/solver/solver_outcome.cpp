@@ -9,25 +9,10 @@
 namespace mbsopt {
 
 std::string_view to_string(SolverStatus status) {
-  switch (status) {
-    case SolverStatus::converged:
-      return "converged";
-    case SolverStatus::converged_beyond_limit:
-      return "converged_beyond_limit";
-    case SolverStatus::searched:
-      return "searched";
-    case SolverStatus::no_progress:
-      return "no_progress";
-    case SolverStatus::iteration_limit:
-      return "iteration_limit";
-    case SolverStatus::infeasible:
-      return "infeasible";
-    case SolverStatus::stopped:
-      return "stopped";
-    case SolverStatus::failed:
-      break;
-  }
-  return "failed";
+  constexpr std::string_view kNames[] = {
+      "converged", "converged_beyond_limit", "searched", "no_progress", "iteration_limit", "infeasible", "stopped",
+      "failed"};
+  return kNames[static_cast<std::size_t>(status)];
 }
 
 std::string SolverOutcome::failures() const {

@@ -19,7 +19,7 @@ enum class SolverStatus {
   stopped,
   failed
 };
-std::string_view to_string(SolverStatus status);  // "converged", "no_progress", "iteration_limit", ...
+std::string_view to_string(SolverStatus status);  // in this order: "converged", "no_progress", "iteration_limit", ...
 
 struct SolverOutcome {
   SolverStatus status = SolverStatus::failed;
