@@ -147,7 +147,7 @@ class Search {
   // Ends with a status and a message.
   void iterate() {
     LinearModel model(problem_, point_);
-    if (!told(free_gradient(model), 0)) return;
+    if (!told(model, 0)) return;
     first_size_ = model.size;
     if (options_.large_residuals) equalise(model.units);
     VectorXd d = step(model, lambda_);
@@ -161,7 +161,7 @@ class Search {
       const bool accepted = std::isfinite(trial.cost) && (trial.gained > kAccepted * std::max(trial.promised, 0.0) ||
                                                           (settled && trial.gained >= 0));
       if (accepted) accept(std::move(trial), model);
-      if (!told(free_gradient(model), d.norm())) return;
+      if (!told(model, d.norm())) return;
       if (settled) return converged(model, lambda_);
       if (!accepted && is_last(trial, model, d)) return;
       d = accepted ? step(model, lambda_) : shorter_step(model, d, trial);
@@ -299,9 +299,8 @@ class Search {
     const VectorXd sizes = (problem_.x_upper - problem_.x_lower).unaryExpr([](double range) {
       return std::isfinite(range) && range > 0 ? range : 1.0;
     });
-    double least = kInfinity;
-    for (const double length : VectorXd(units.cwiseProduct(sizes)))
-      if (length > 0) least = std::min(least, length);
+    const Eigen::ArrayXd lengths = units.cwiseProduct(sizes).array();
+    const double least = (lengths > 0).select(lengths, kInfinity).minCoeff();
     if (std::isfinite(least)) units = least * sizes.cwiseInverse();
   }
 
@@ -337,33 +336,23 @@ class Search {
     return model.units.cwiseProduct(d).norm() <= options_.tolerance * size;
   }
 
-  bool presses(Index k, double gradient) const {
-    return (x_(k) <= problem_.x_lower(k) && gradient > 0) || (x_(k) >= problem_.x_upper(k) && gradient < 0);
+  // The gradient, zero where it only presses on a bound.
+  VectorXd free_gradient(const LinearModel& model) const {
+    VectorXd free = model.gradient;
+    for (Index k = 0; k < free.size(); ++k)
+      if ((x_(k) <= problem_.x_lower(k) && free(k) > 0) || (x_(k) >= problem_.x_upper(k) && free(k) < 0)) free(k) = 0;
+    return free;
   }
 
   bool no_gradient(const LinearModel& model) const {
     const double size = std::sqrt(2 * model.size);
-    if (size <= kNothing) return true;
-    for (Index k = 0; k < x_.size(); ++k)
-      if (!presses(k, model.gradient(k)) && std::abs(model.gradient(k)) > kGradient * model.D(k) * size) return false;
-    return true;
-  }
-
-  // The largest entry of the gradient, without those that only press on a bound.
-  double free_gradient(const LinearModel& model) const {
-    double largest = 0;
-    for (Index k = 0; k < x_.size(); ++k)
-      if (!presses(k, model.gradient(k))) largest = std::max(largest, std::abs(model.gradient(k)));
-    return largest;
+    return size <= kNothing || (free_gradient(model).array().abs() <= kGradient * model.D.array() * size).all();
   }
 
   // The decrease of the cost by the best step along one free variable, from the derivatives: a lower bound of the rest.
   double promise(const LinearModel& model) const {
-    double most = 0;
-    for (Index k = 0; k < x_.size(); ++k)
-      if (!presses(k, model.gradient(k)) && model.D(k) > 0)
-        most = std::max(most, 0.5 * std::pow(model.gradient(k) / model.D(k), 2));
-    return most;
+    const Eigen::ArrayXd D = model.D.array();
+    return (D > 0).select(0.5 * (free_gradient(model).array() / D).square(), 0).maxCoeff();
   }
 
   // Steps that were shortened to nothing are not convergence.
@@ -383,7 +372,8 @@ class Search {
         fmt::format("converged: cost and parameters change by less than {:g} of themselves", options_.tolerance));
   }
 
-  bool told(double gradient, double step) {
+  bool told(const LinearModel& model, double step) {
+    const double gradient = free_gradient(model).lpNorm<Eigen::Infinity>();
     if (!options_.progress || options_.progress({result_.iterations, cost_, gradient, step, x_, point_.z})) return true;
     result_.end_on_request();
     return false;
