@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/sensor/body_at.hpp"
+#include "core/mechanism/followed_angles.hpp"
 
 namespace mbsopt::cvodes {
 
@@ -19,14 +19,9 @@ void Flow::start(double t, const Eigen::VectorXd& angles) {
 }
 
 void Flow::accept(double t, const Eigen::VectorXd& y) {
-  const std::vector<JointAngle>& followed = data().angles;
-  if (followed.empty()) return;
+  if (data().angles.empty()) return;
   Eigen::VectorXd next = angles_.back();
-  for (std::size_t k = 0; k < followed.size(); ++k) {
-    const JointAngle& a = followed[k];
-    double& angle = next(static_cast<Eigen::Index>(k));
-    angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
-  }
+  continue_angles(data(), y, next);
   times_.push_back(t);
   angles_.push_back(std::move(next));
 }

@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "core/integrate/model_choice.hpp"
+#include "core/mechanism/followed_angles.hpp"
 #include "core/mechanism/joint_graph.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
-#include "core/sensor/body_at.hpp"
 #include "core/step/step_control.hpp"
 
 namespace mbsopt {
@@ -190,11 +190,8 @@ StepOutcome StepAttempt::finish(bool dense) {
   } else {
     step.y1 = step.y_hat;
   }
-  for (std::size_t k = 0; k < data_.angles.size(); ++k) {
-    const JointAngle& a = data_.angles[k];
-    const Eigen::Index i = static_cast<Eigen::Index>(k);
-    step.angles1(i) = a.value_near(step.angles0(i), body_at(step.y1, a.body1).frame, body_at(step.y1, a.body2).frame);
-  }
+  step.angles1 = step.angles0;
+  continue_angles(data_, step.y1, step.angles1);
   return StepOutcome::accepted;
 }
 

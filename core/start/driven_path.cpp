@@ -11,8 +11,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/dynamics/planar_bodies.hpp"
 #include "core/force/forces.hpp"
-#include "core/mechanism/mechanism_data.hpp"
-#include "core/sensor/body_at.hpp"
+#include "core/mechanism/followed_angles.hpp"
 
 namespace mbsopt {
 namespace {
@@ -147,13 +146,8 @@ bool DrivenPath::step(double h, double t1) {
   state_.t = t1;
   state_.a = (y_next_.tail(half) - state_.y.tail(half)) / h;
   state_.y = y_next_;
-  const MechanismData& d = mechanism_.data();
-  if (planar_) keep_in_plane(d, state_.a);
-  for (std::size_t k = 0; k < d.angles.size(); ++k) {
-    const JointAngle& a = d.angles[k];
-    double& angle = state_.angles(static_cast<Index>(k));
-    angle = a.value_near(angle, body_at(state_.y, a.body1).frame, body_at(state_.y, a.body2).frame);
-  }
+  if (planar_) keep_in_plane(mechanism_.data(), state_.a);
+  continue_angles(mechanism_.data(), state_.y, state_.angles);
   ++steps_;
   return true;
 }

@@ -3,9 +3,8 @@
 #include <cmath>
 
 #include "core/body/state_layout.hpp"
-#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/followed_angles.hpp"
 #include "core/mechanism/planar_model.hpp"
-#include "core/sensor/body_at.hpp"
 #include "core/start/assembly_equations.hpp"
 #include "core/start/assembly_problems.hpp"
 
@@ -29,11 +28,7 @@ double NearestApproach::defect(double t, Eigen::VectorXd& e_rho) {
   Eigen::VectorXd theta_bar = Eigen::VectorXd::Zero(d.slots());
   e_rho.setZero(d.rho.size());
   const double violation = projector_->approach(t, angles_, y_, theta_bar, e_rho);
-  for (std::size_t k = 0; k < d.angles.size(); ++k) {
-    const JointAngle& a = d.angles[k];
-    double& angle = angles_(static_cast<Eigen::Index>(k));
-    angle = a.value_near(angle, body_at(y_, a.body1).frame, body_at(y_, a.body2).frame);
-  }
+  continue_angles(d, y_, angles_);
   if (violation <= kClosed) {
     e_rho.setZero();
     return 0;
