@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <span>
 
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
-#include "core/sensor/body_at.hpp"
+#include "core/mechanism/followed_angles.hpp"
 
 namespace mbsopt {
 
@@ -17,11 +16,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-
-struct RowOrder {
-  bool operator()(const Constraint& c, int row) const { return c.row < row; }
-  bool operator()(int row, const Constraint& c) const { return row < c.row; }
-};
 
 // A half turn is +pi, so that rounding does not decide its sign.
 constexpr double kHalfTurn = -std::numbers::pi + 1e-6;
@@ -34,38 +28,11 @@ VectorXd with_unit_velocity(const VectorXd& y, Index j) {
   return at;
 }
 
-template <class P>
-Multipliers<P::kRows> only_mu0(const Vec<P::kRows>& mu0) {
-  Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
-  z.mu0 = mu0;
-  return z;
-}
-template <class P>
-Multipliers<P::kRows> only_mu1(const Vec<P::kRows>& mu1) {
-  Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
-  z.mu1 = mu1;
-  return z;
-}
-
 struct PrimitiveBars {
   FrameBar bar1, bar2;
   GeometryBar s;
   PrimitiveBars() { bar1.set_zero(), bar2.set_zero(); }
 };
-
-BodyAt at_rest(const VectorXd& y, int body) {
-  BodyAt b;
-  if (body > 0) set_position(y.segment<7>(StateLayout::of(y).q(body)), b.state, b.frame);
-  return b;
-}
-
-// The part of a pull-back that lies in q.
-void add_to_row(const BodyAt& b, const StateLayout& layout, int body, const FrameBar& bar, AssemblyEquations::Row row) {
-  if (body == 0) return;
-  Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
-  add_pull_back_velocity(b.state, bar, 1, q_bar, v_bar);
-  row.segment<7>(layout.q(body)) += q_bar.transpose();
-}
 
 }  // namespace
 
@@ -134,9 +101,8 @@ void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) 
     if (!g.shared) continue;
     double sum = 0;
     const Constraint* last = nullptr;
-    const auto [first, last_of_row] = std::equal_range(  // rows ascend
-        data_.constraints.begin(), data_.constraints.end(), g.row, RowOrder{});
-    for (const Constraint& c : std::span(first, last_of_row)) {
+    for (const Constraint& c : data_.constraints) {
+      if (c.row != g.row) continue;
       sum += term_value(c, y, angles);
       if (std::holds_alternative<Angle>(c.primitive)) last = &c;
     }
@@ -159,11 +125,7 @@ void AssemblyEquations::start_branches(const VectorXd& y) {
 }
 
 void AssemblyEquations::continue_branches(const VectorXd& y) {
-  for (std::size_t i = 0; i < data_.angles.size(); ++i) {
-    const JointAngle& a = data_.angles[i];
-    double& angle = angles_(static_cast<Index>(i));
-    angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
-  }
+  continue_angles(data_, y, angles_);
   for (AssemblyTarget& target : targets_) {
     if (target.sensor->angle() >= 0) {
       target.branch = evaluate(data_, target.sensor, t_, y, branches(target));
@@ -241,12 +203,13 @@ AssemblyEquations::SparseGradients AssemblyEquations::sparse_gradients(const Vec
   return out;
 }
 
-// rho is null if it is not wanted.
-template <class AddEntry>
-void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd* rho) const {
-  const bool positions = level_ == AssemblyLevel::position;
+// Calls add(row, column, value) for the gradient in y of the joints' rows at a level, and add_field(row, slot, bar) for
+// that in fields. If `only` is a body, other bodies' joints are left out.
+template <class AddEntry, class AddField>
+void AssemblyEquations::collect_joints(AssemblyLevel level, const VectorXd& y, int only, AddEntry&& add,
+                                       AddField&& add_field) const {
+  const bool positions = level == AssemblyLevel::position;
   const StateLayout layout{data_.n};
-  if (rho) *rho = MatrixXd::Zero(rows(), data_.rho.size());
   const auto add_body = [&](Index row, const BodyAt& b, int body, const FrameBar& bar) {
     if (body == 0) return;
     Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
@@ -257,32 +220,40 @@ void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, Mat
     }
   };
   for (const Constraint& c : data_.constraints) {
+    if (only > 0 && c.body1 != only && c.body2 != only) continue;
     const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
     std::visit(
-        [&](const auto& p) {
-          using P = std::decay_t<decltype(p)>;
+        [&]<class P>(const P& p) {
           for (int i = 0; i < P::kRows; ++i) {
-            const Vec<P::kRows> unit = c.factor * Vec<P::kRows>::Unit(i);
+            Multipliers<P::kRows> unit = Multipliers<P::kRows>::zero();
+            (positions ? unit.mu0 : unit.mu1) = c.factor * Vec<P::kRows>::Unit(i);
             PrimitiveBars bars;
-            p.pull_back(b1.frame, b2.frame, positions ? only_mu0<P>(unit) : only_mu1<P>(unit), bars.bar1, bars.bar2,
-                        bars.s);
+            p.pull_back(b1.frame, b2.frame, unit, bars.bar1, bars.bar2, bars.s);
             const Index row = c.row + i;
             add_body(row, b1, c.body1, bars.bar1);
             add_body(row, b2, c.body2, bars.bar2);
-            if (!rho) continue;
-            add_slot(c.slot1, bars.s.s1, rho->row(row));
-            add_slot(c.slot2, bars.s.s2, rho->row(row));
-            add_slot(c.slot3, bars.s.s3, rho->row(row));
+            add_field(row, c.slot1, bars.s.s1);
+            add_field(row, c.slot2, bars.s.s2);
+            add_field(row, c.slot3, bars.s.s3);
           }
-          if (rho && c.slot_factor >= 0) {
-            Vec<P::kRows> phi_dot;
-            p.phi_dot(b1.frame, b2.frame, phi_dot);
-            const double value = positions ? term_value(c, y, angles_) / c.factor : phi_dot(0);
-            add_slot(c.slot_factor, Vec<1>(value), rho->row(c.row));
-          }
+          if (c.slot_factor < 0) return;
+          Vec<P::kRows> phi_dot;
+          p.phi_dot(b1.frame, b2.frame, phi_dot);
+          add_field(c.row, c.slot_factor, Vec<1>(positions ? term_value(c, y, angles_) / c.factor : phi_dot(0)));
         },
         c.primitive);
   }
+}
+
+// rho is null if it is not wanted.
+template <class AddEntry>
+void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd* rho) const {
+  const bool positions = level_ == AssemblyLevel::position;
+  const StateLayout layout{data_.n};
+  if (rho) *rho = MatrixXd::Zero(rows(), data_.rho.size());
+  collect_joints(level_, y, 0, add, [&](Index row, int slot, const auto& bar) {
+    if (rho) add_slot(slot, bar, rho->row(row));
+  });
   if (rho) add_law_gradients(*rho);
   Index row = data_.m;
   for (int i = 1; i <= data_.n; ++i, ++row) {
@@ -318,46 +289,22 @@ void AssemblyEquations::add_law_gradients(MatrixXd& rho) const {
 AssemblyEquations::Gradients AssemblyEquations::second(const VectorXd& y, const VectorXd& nu) const {
   const Index N = y.size() / 2;
   Gradients out{MatrixXd::Zero(N, y.size()), MatrixXd::Zero(N, data_.rho.size())};
-  add_joint_curvature(y, nu, out);
   const StateLayout layout{data_.n};
+  for (int i = 1; i <= data_.n; ++i) {
+    for (Index j = layout.q(i); j < layout.q(i) + 7; ++j) {
+      const auto add = [&](Index row, Index column, double value) {
+        if (column < N) out.y(j, column) += nu(row) * value;
+      };
+      collect_joints(AssemblyLevel::velocity, with_unit_velocity(y, j), i, add,
+                     [&](Index row, int slot, const auto& bar) { add_slot(slot, nu(row) * bar, out.rho.row(j)); });
+    }
+  }
   Index row = data_.m;
   for (int i = 1; i <= data_.n; ++i) {
     out.y.block<4, 4>(layout.p(i), layout.p(i)).diagonal().array() += 2 * nu(row++);
   }
   for (const AssemblyTarget& target : targets_) add_target_curvature(target, y, nu(row++), out);
   return out;
-}
-
-void AssemblyEquations::add_joint_curvature(const VectorXd& y, const VectorXd& nu, Gradients& out) const {
-  const StateLayout layout{data_.n};
-  for (const Constraint& c : data_.constraints) {
-    for (const int moving : {c.body1, c.body2}) {
-      if (moving == 0) continue;
-      for (int k = 0; k < 7; ++k) {
-        BodyAt b1 = at_rest(y, c.body1), b2 = at_rest(y, c.body2);
-        BodyAt& b = moving == c.body1 ? b1 : b2;
-        set_velocity(Vec<7>::Unit(k), b.state, b.frame);
-        const Index j = layout.q(moving) + k;
-        PrimitiveBars bars;
-        std::visit(
-            [&](const auto& p) {
-              using P = std::decay_t<decltype(p)>;
-              p.pull_back(b1.frame, b2.frame, only_mu1<P>(c.factor * nu.segment<P::kRows>(c.row)), bars.bar1, bars.bar2,
-                          bars.s);
-              if (c.slot_factor < 0) return;
-              Vec<P::kRows> rate;
-              p.phi_dot(b1.frame, b2.frame, rate);
-              add_slot(c.slot_factor, Vec<1>(nu(c.row) * rate(0)), out.rho.row(j));
-            },
-            c.primitive);
-        add_to_row(b1, layout, c.body1, bars.bar1, out.y.row(j));
-        add_to_row(b2, layout, c.body2, bars.bar2, out.y.row(j));
-        add_slot(c.slot1, bars.s.s1, out.rho.row(j));
-        add_slot(c.slot2, bars.s.s2, out.rho.row(j));
-        add_slot(c.slot3, bars.s.s3, out.rho.row(j));
-      }
-    }
-  }
 }
 
 void AssemblyEquations::add_target_curvature(const AssemblyTarget& target, const VectorXd& y, double nu,

@@ -68,8 +68,10 @@ class AssemblyEquations {
 
  private:
   Eigen::VectorXd branches(const AssemblyTarget& target) const;
-  void add_joint_curvature(const Eigen::VectorXd& q, const Eigen::VectorXd& nu, Gradients& out) const;
   void add_target_curvature(const AssemblyTarget& target, const Eigen::VectorXd& y, double nu, Gradients& out) const;
+  template <class AddEntry, class AddField>
+  void collect_joints(AssemblyLevel level, const Eigen::VectorXd& y, int only, AddEntry&& add,
+                      AddField&& add_field) const;
   template <class AddEntry>
   void collect_gradients(const Eigen::VectorXd& y, AddEntry&& add, Eigen::MatrixXd* rho) const;
   void add_law_gradients(Eigen::MatrixXd& rho) const;
