@@ -121,7 +121,7 @@ struct Assembly::Solution {
       result.message = "the mechanism does not close in the assembly mode of its guess";
       return;
     }
-    q.emplace(nearest_point(positions, guess, Decomposition::on_demand, data.assembly_iterations));
+    q.emplace(nearest_point(positions, guess, data.assembly_iterations));
     result.y.head(N) = q->x;
     result.iterations = q->iterations;
     result.residual = q->F.size() > 0 ? q->F.lpNorm<Eigen::Infinity>() : 0.0;
@@ -132,8 +132,7 @@ struct Assembly::Solution {
     if (data.equilibrium) return rest_in_equilibrium();
     velocity.set_angles(position.followed_angles());
     VelocityProblem velocities(velocity, q->x);
-    v.emplace(
-        nearest_point(velocities, velocity_guess(data, q->x), Decomposition::on_demand, data.assembly_iterations));
+    v.emplace(nearest_point(velocities, velocity_guess(data, q->x), data.assembly_iterations));
     result.y.tail(N) = v->x;
     result.iterations += v->iterations;
     result.residual = std::max(result.residual, v->F.lpNorm<Eigen::Infinity>());

@@ -159,8 +159,7 @@ std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, c
     equations.start_branches(y);
     ++fruitless;
     if (projector->approach(t, equations.angles(), y, theta_bar, rho_bar) > kOpen * (1 + size_of(y))) continue;
-    NearestPoint found =
-        nearest_point(positions, y.head(guess.size()), Decomposition::on_demand, d.assembly_iterations);
+    NearestPoint found = nearest_point(positions, y.head(guess.size()), d.assembly_iterations);
     if (found.status != NearestPointStatus::found) continue;
     if (!found.determined) linearise(positions, found);
     if (!found.determined && found.linearisation.rank() < found.x.size()) continue;

@@ -5,12 +5,13 @@
 //   x - x_guess + J'nu = 0,  F = 0,  J = F_x,  multipliers nu
 //
 // Its derivatives are those of nearest_point_linearisation.hpp. Nocedal and Wright, "Numerical Optimization" (2006),
-// sections 18.4 and 18.5 (SQP, merit functions).
+// sections 10.3 (Levenberg-Marquardt) and 18.1 (Newton's method on the optimality conditions).
 //
 // Far from the solution, Gauss-Newton steps (H = I) of limited length lead from the guess onto the equations, without a
 // merit function. They stay on the guess's branch. They also pass redundant equations whose rank changes on the way, at
-// which a line search stalls. Near the solution Newton steps converge to rounding. If Gauss-Newton cycles (the
-// curvature of the equations exceeds 2 as seen from the guess), SQP with a merit function follows.
+// which a line search stalls. Near the solution Newton steps converge to rounding. If Gauss-Newton circles (the
+// curvature of the equations exceeds 2 as seen from the guess), it takes a part of each step along the equations. If
+// the equations stay violated, Levenberg-Marquardt steps lead to their least violation.
 #pragma once
 
 #include <Eigen/Core>
@@ -57,10 +58,8 @@ struct NearestPoint {
   NearestPointLinearisation linearisation;
 };
 
-enum class Decomposition { now, on_demand };
 // iterations is the largest number for each method.
-NearestPoint nearest_point(NearestPointEquations& equations, const Eigen::VectorXd& x_guess,
-                           Decomposition decomposition = Decomposition::now, int iterations = 400);
+NearestPoint nearest_point(NearestPointEquations& equations, const Eigen::VectorXd& x_guess, int iterations = 400);
 // Computes the dense decomposition. A guess that satisfies its equations to rounding needs none before this call.
 void linearise(NearestPointEquations& equations, NearestPoint& found);
 

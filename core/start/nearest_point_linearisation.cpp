@@ -97,8 +97,6 @@ MatrixXd null_space_by_parts(const MatrixXd& J, const OrthogonalDecomposition& J
 
 }  // namespace
 
-NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J)
-    : NearestPointLinearisation(J, VectorXd::Ones(J.cols())) {}
 NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const VectorXd& sizes)
     : J_(J), scale_(J.rows()), sizes_(sizes) {
   const MatrixXd sized = J * sizes.asDiagonal();
@@ -156,21 +154,21 @@ void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
 }
 
 // Z V inv(lambda) V'Z' gap, by products of plain matrices: each other form of a product is compiled anew.
-MatrixXd NearestPointLinearisation::free_part(const VectorXd& lambda, const MatrixXd& gap) const {
+MatrixXd NearestPointLinearisation::free_part(const MatrixXd& gap) const {
   const MatrixXd reduced = Z_.transpose() * gap;
   MatrixXd modes = V_.transpose() * reduced;
-  modes.array().colwise() /= lambda.array();
+  modes.array().colwise() /= lambda_.array();
   const MatrixXd free = V_ * modes;
   return Z_ * free;
 }
 
 MatrixXd NearestPointLinearisation::solve(const MatrixXd& b, const MatrixXd& g) const {
   const MatrixXd x = particular(b), gap = g - H_ * x;
-  return x + free_part(lambda_, gap);
+  return x + free_part(gap);
 }
 
 void NearestPointLinearisation::solve_transposed(const MatrixXd& x_bar, MatrixXd& b_bar, MatrixXd& g_bar) const {
-  g_bar = free_part(lambda_, x_bar);
+  g_bar = free_part(x_bar);
   b_bar = multipliers(x_bar - H_.transpose() * g_bar);
 }
 
@@ -187,14 +185,6 @@ double NearestPointLinearisation::rounding(const MatrixXd& x, const MatrixXd& g)
     if (size > 0) worst = std::max(worst, kRelativeRounding * error.col(k).cwiseQuotient(sizes_).maxCoeff() / size);
   }
   return worst;
-}
-
-VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g) const {
-  constexpr double kPositive = 1e-6, kFloor = 0.1;
-  const VectorXd x = pseudo_inverse_times(b), gap = g - H_ * x;
-  VectorXd lambda = lambda_;
-  if (lambda.size() > 0 && lambda(0) < kPositive) lambda = lambda.cwiseAbs().cwiseMax(kFloor);
-  return x + free_part(lambda, gap);
 }
 
 }  // namespace mbsopt

@@ -21,7 +21,6 @@ class NearestPointLinearisation {
   static constexpr double kRankThreshold = 1e-8;  // relative, rows of J scaled to unit length
 
   NearestPointLinearisation() = default;
-  explicit NearestPointLinearisation(const Eigen::MatrixXd& J);
   NearestPointLinearisation(const Eigen::MatrixXd& J, const Eigen::VectorXd& sizes);
 
   Eigen::Index rank() const { return J_transposed_.rank(); }
@@ -46,12 +45,10 @@ class NearestPointLinearisation {
   // The rounding of x = solve(b, g), whose part along Z sums large terms: eps |Z| |Z'HZ|^-1 |Z|'(|g| + |H| |x|). The
   // largest over all unknowns and columns, each relative to the largest unknown, in units of the sizes.
   double rounding(const Eigen::MatrixXd& x, const Eigen::MatrixXd& g) const;
-  // Solves with the eigenvalues of Z'HZ made positive: a descent direction of the merit function everywhere.
-  Eigen::VectorXd descent(const Eigen::VectorXd& b, const Eigen::VectorXd& g) const;
 
  private:
   Eigen::MatrixXd particular(const Eigen::MatrixXd& b) const;  // some x with J x = b
-  Eigen::MatrixXd free_part(const Eigen::VectorXd& lambda, const Eigen::MatrixXd& gap) const;
+  Eigen::MatrixXd free_part(const Eigen::MatrixXd& gap) const;
 
   Eigen::MatrixXd J_;
   Eigen::VectorXd scale_, sizes_;         // of the rows and of the columns of J
