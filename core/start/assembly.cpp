@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -112,7 +113,7 @@ struct Assembly::Solution {
   void solve() {
     const Index N = layout.positions();
     result.y = VectorXd::Zero(2 * N);
-    PositionProblem positions(position);
+    AssemblyProblem positions(position);
     const VectorXd guess = position_guess(data);
     result.y.head(N) = guess;
     position.start_branches(result.y);
@@ -131,7 +132,7 @@ struct Assembly::Solution {
     }
     if (data.equilibrium) return rest_in_equilibrium();
     velocity.set_angles(position.followed_angles());
-    VelocityProblem velocities(velocity, q->x);
+    AssemblyProblem velocities(velocity, q->x);
     v.emplace(nearest_point(velocities, velocity_guess(data, q->x), data.assembly_iterations));
     result.y.tail(N) = v->x;
     result.iterations += v->iterations;
@@ -182,72 +183,6 @@ struct Assembly::Solution {
     result.message = equilibrium.message;
   }
 
-  // Sparse factors differentiate a large mechanism whose guess satisfies everything, in the time of a few steps. The
-  // dense decomposition below takes as long as a run.
-  struct Sparse {
-    SparseProjection q, v;
-    std::vector<SparseEntry> v_b_q;  // -F_q at velocity level
-    MatrixXd q_b_rho, q_g_rho, v_b_rho, v_g_rho;
-    std::vector<Mat<7, 4>> v_g_q;  // per body, in its own p
-  };
-  static constexpr int kManyBodies = 12;
-  bool is_sparse() const { return data.n >= kManyBodies && !q->linearised && !v->linearised; }
-  Sparse sparse_derivatives() const {
-    const Index N = layout.positions();
-    AssemblyEquations::SparseGradients F = position.sparse_gradients(result.y), G = velocity.sparse_gradients(result.y);
-    std::vector<SparseEntry> G_q, G_v;
-    for (const SparseEntry& e : G.y) {
-      if (e.column < N) {
-        G_q.push_back({e.row, e.column, -e.value});
-      } else {
-        G_v.push_back({e.row, static_cast<int>(e.column - N), e.value});
-      }
-    }
-    Sparse s{SparseProjection(position.rows(), N, F.y),
-             SparseProjection(velocity.rows(), N, G_v),
-             std::move(G_q),
-             -F.rho,
-             position_guess_rho(data),
-             -G.rho,
-             {},
-             {}};
-    velocity_guess_derivatives(data, q->x, s.v_g_q, s.v_g_rho);
-    return s;
-  }
-  MatrixXd sparse_tangent() const {
-    const Sparse s = sparse_derivatives();
-    const MatrixXd q_rho = s.q.solve(s.q_b_rho, s.q_g_rho);
-    MatrixXd b = s.v_b_rho, g = s.v_g_rho;
-    for (const SparseEntry& e : s.v_b_q) b.row(e.row) += e.value * q_rho.row(e.column);
-    for (int i = 1; i <= data.n; ++i) {
-      g.middleRows<7>(layout.q(i)) += s.v_g_q[at(i)] * q_rho.middleRows<4>(layout.p(i));
-    }
-    MatrixXd y_rho(result.y.size(), data.rho.size());
-    y_rho << q_rho, s.v.solve(b, g);
-    return y_rho;
-  }
-  void add_sparse_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
-    const Sparse s = sparse_derivatives();
-    const Index N = layout.positions();
-    MatrixXd b_bar, g_bar, q_bar = y_bar.topRows(N);
-    s.v.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
-    rho_bar += s.v_b_rho.transpose() * b_bar + s.v_g_rho.transpose() * g_bar;
-    for (const SparseEntry& e : s.v_b_q) q_bar.row(e.column) += e.value * b_bar.row(e.row);
-    for (int i = 1; i <= data.n; ++i) {
-      q_bar.middleRows<4>(layout.p(i)) += s.v_g_q[at(i)].transpose() * g_bar.middleRows<7>(layout.q(i));
-    }
-    s.q.solve_transposed(q_bar, b_bar, g_bar);
-    rho_bar += s.q_b_rho.transpose() * b_bar + s.q_g_rho.transpose() * g_bar;
-  }
-
-  // Call this before the linearisations of q and v are used.
-  void linearise_both() {
-    PositionProblem positions(position);
-    linearise(positions, *q);
-    VelocityProblem velocities(velocity, q->x);
-    linearise(velocities, *v);
-  }
-
   // A condition's angle is on the turn that the condition names, so that a measured angle starts at its measured value.
   // Other angles are within half a turn of zero, and the last angle of a gear is on the branch that the gear needs. A
   // condition on an expression of angles may hold only on other turns; angles then keep those to which they were
@@ -270,29 +205,73 @@ struct Assembly::Solution {
     position.settle_shared_rows(result.y, result.angles);
   }
 
-  // Right-hand sides of both linear systems (nearest_point_linearisation.hpp). Those of v need q' as well:
+  // Both linear systems (nearest_point_linearisation.hpp). The right-hand sides of v need q' as well:
   //   J_q q' = -q_F_rho,           H_q q' + .. = q_g_rho
   //   J_v v' = -F_q q' - F_rho,    H_v v' + .. = g_q q' + g_rho
   struct Derivatives {
-    MatrixXd q_b_rho, q_g_rho, v_b_q, v_b_rho, v_g_q, v_g_rho;
+    std::vector<SparseEntry> q_J, v_J, v_b_q;  // v_b_q = -F_q at velocity level
+    MatrixXd q_b_rho, q_g_rho, v_b_rho, v_g_rho;
+    std::vector<Mat<7, 4>> v_guess_q{};  // per body, in its own p; none if nothing is free
+    MatrixXd v_curvature{};              // (J_v'nu)_q; none if nu = 0
+
+    MatrixXd b_of(const MatrixXd& q_rho) const {  // -F_q q'
+      MatrixXd b = MatrixXd::Zero(v_b_rho.rows(), q_rho.cols());
+      for (const SparseEntry& e : v_b_q) b.row(e.row) += e.value * q_rho.row(e.column);
+      return b;
+    }
+    MatrixXd g_of(const MatrixXd& q_rho) const {  // g_q q'
+      MatrixXd g = MatrixXd::Zero(v_g_rho.rows(), q_rho.cols());
+      if (v_curvature.size() > 0) g -= v_curvature * q_rho;
+      for (Index i = 1; i < std::ssize(v_guess_q); ++i)
+        g.middleRows<7>(7 * i - 7) += v_guess_q[at(static_cast<int>(i))] * q_rho.middleRows<4>(7 * i - 4);
+      return g;
+    }
+    void add_to_q_bar(const MatrixXd& b_bar, const MatrixXd& g_bar, MatrixXd& q_bar) const {
+      for (const SparseEntry& e : v_b_q) q_bar.row(e.column) += e.value * b_bar.row(e.row);
+      if (v_curvature.size() > 0) q_bar -= v_curvature.transpose() * g_bar;
+      for (Index i = 1; i < std::ssize(v_guess_q); ++i)
+        q_bar.middleRows<4>(7 * i - 4) +=
+            v_guess_q[at(static_cast<int>(i))].transpose() * g_bar.middleRows<7>(7 * i - 7);
+    }
   };
   Derivatives derivatives() const {
     const Index N = layout.positions(), P = data.rho.size();
-    const auto is_free = [](const NearestPoint& point) { return point.linearisation.null_space().cols() > 0; };
-    Derivatives d{{}, MatrixXd::Zero(N, P), {}, {}, MatrixXd::Zero(N, N), MatrixXd::Zero(N, P)};
-    d.q_b_rho = -position.gradients(result.y).rho;
-    if (is_free(*q)) d.q_g_rho = position_guess_rho(data) - position.second(result.y, q->nu).rho;
-    const AssemblyEquations::Gradients F = velocity.gradients(result.y);
-    d.v_b_q = -F.y.leftCols(N);
-    d.v_b_rho = -F.rho;
-    if (!is_free(*v)) return d;
+    const auto is_free = [](const NearestPoint& point) {
+      return !point.linearised || point.linearisation.null_space().cols() > 0;
+    };
+    AssemblyEquations::SparseGradients F = position.sparse_gradients(result.y), G = velocity.sparse_gradients(result.y);
+    Derivatives d{std::move(F.y), {}, {}, -F.rho, MatrixXd::Zero(N, P), -G.rho, MatrixXd::Zero(N, P)};
+    for (const SparseEntry& e : G.y) {
+      if (e.column < N) {
+        d.v_b_q.push_back({e.row, e.column, -e.value});
+      } else {
+        d.v_J.push_back({e.row, static_cast<int>(e.column - N), e.value});
+      }
+    }
+    if (is_free(*q)) d.q_g_rho = position_guess_rho(data);
+    if (is_free(*q) && q->nu.any()) d.q_g_rho -= position.second(result.y, q->nu).rho;
+    if (is_free(*v)) velocity_guess_derivatives(data, q->x, d.v_guess_q, d.v_g_rho);
+    if (!is_free(*v) || !v->nu.any()) return d;
     const AssemblyEquations::Gradients S = velocity.second(result.y, v->nu);
-    std::vector<Mat<7, 4>> v_guess_q;
-    velocity_guess_derivatives(data, q->x, v_guess_q, d.v_g_rho);
-    d.v_g_q = -S.y.leftCols(N);
-    for (int i = 1; i <= data.n; ++i) d.v_g_q.block<7, 4>(layout.q(i), layout.p(i)) += v_guess_q[at(i)];
+    d.v_curvature = S.y.leftCols(N);
     d.v_g_rho -= S.rho;
     return d;
+  }
+
+  // Calls f(q, v, derivatives): q and v solve the linear systems. Sparse factors differentiate a large mechanism whose
+  // guess satisfies everything, in the time of a few steps. The dense decomposition takes as long as a run.
+  static constexpr int kManyBodies = 12;
+  template <class F>
+  void with_systems(F&& f) {
+    const Index N = layout.positions();
+    if (data.n >= kManyBodies && !q->linearised && !v->linearised) {
+      const Derivatives d = derivatives();
+      return f(SparseProjection(position.rows(), N, d.q_J), SparseProjection(velocity.rows(), N, d.v_J), d);
+    }
+    AssemblyProblem positions(position), velocities(velocity, q->x);
+    linearise(positions, *q);
+    linearise(velocities, *v);
+    f(q->linearisation, v->linearisation, derivatives());
   }
 
   const Mechanism mechanism;
@@ -321,11 +300,10 @@ MatrixXd Assembly::tangent() const {
     y_rho.topRows(s.layout.positions()) = s.equilibrium.q_rho;
     return y_rho;
   }
-  if (s.is_sparse()) return s.sparse_tangent();
-  s.linearise_both();
-  const Solution::Derivatives d = s.derivatives();
-  const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho);
-  y_rho << q_rho, s.v->linearisation.solve(d.v_b_q * q_rho + d.v_b_rho, d.v_g_q * q_rho + d.v_g_rho);
+  s.with_systems([&](const auto& q, const auto& v, const Solution::Derivatives& d) {
+    const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho);
+    y_rho << q_rho, v.solve(d.b_of(q_rho) + d.v_b_rho, d.g_of(q_rho) + d.v_g_rho);
+  });
   return y_rho;
 }
 
@@ -340,76 +318,64 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
     rho_bar += s.equilibrium.q_rho.transpose() * y_bar.topRows(N);
     return;
   }
-  if (s.is_sparse()) return s.add_sparse_adjoint(y_bar, rho_bar);
-  s.linearise_both();
-  const Solution::Derivatives d = s.derivatives();
-  MatrixXd b_bar, g_bar;
-  s.v->linearisation.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
-  rho_bar += d.v_b_rho.transpose() * b_bar + d.v_g_rho.transpose() * g_bar;
-  const MatrixXd q_bar = y_bar.topRows(N) + d.v_b_q.transpose() * b_bar + d.v_g_q.transpose() * g_bar;
-  s.q->linearisation.solve_transposed(q_bar, b_bar, g_bar);
-  rho_bar += d.q_b_rho.transpose() * b_bar + d.q_g_rho.transpose() * g_bar;
+  s.with_systems([&](const auto& q, const auto& v, const Solution::Derivatives& d) {
+    MatrixXd b_bar, g_bar, q_bar = y_bar.topRows(N);
+    v.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
+    rho_bar += d.v_b_rho.transpose() * b_bar + d.v_g_rho.transpose() * g_bar;
+    d.add_to_q_bar(b_bar, g_bar, q_bar);
+    q.solve_transposed(q_bar, b_bar, g_bar);
+    rho_bar += d.q_b_rho.transpose() * b_bar + d.q_g_rho.transpose() * g_bar;
+  });
 }
-
-namespace {
-
-// Marks columns of right-hand sides b for which J x = b has no solution. `left` is the part of b that a solution
-// leaves, rows scaled to unit length. b is the sum of pieces, which may cancel.
-void note_unmet(const MatrixXd& left, const VectorXd& row_scale, std::initializer_list<MatrixXd> pieces,
-                const MechanismData& data, std::vector<bool>& unmet) {
-  const double kOpen = std::max(1e-7, 1e3 * data.rounded.part);  // of b: assembly leaves a loop open by far less
-  constexpr double kRounding = 1e-12;                            // of b, in the units of J: sin(pi) is not zero
-  if (left.rows() == 0) return;
-  for (Index k = 0; k < left.cols(); ++k) {
-    double size = 0;
-    for (const MatrixXd& piece : pieces) size += row_scale.cwiseProduct(piece.col(k)).norm();
-    if (left.col(k).norm() > kOpen * size + kRounding * row_scale.maxCoeff()) unmet[static_cast<std::size_t>(k)] = true;
-  }
-}
-
-}  // namespace
 
 std::vector<int> Assembly::obstructed() const {
   Solution& s = *solution_;
   if (!s.result.ok) return {};
-  const Index N = s.layout.positions(), P = s.data.rho.size();
-  std::vector<bool> unmet(static_cast<std::size_t>(P), false);
+  const double kOpen = std::max(1e-7, 1e3 * s.data.rounded.part);  // of b: assembly leaves a loop open by far less
+  constexpr double kRounding = 1e-12;                              // of b, in the units of J: sin(pi) is not zero
+  std::vector<int> parameters;
+  // Adds the columns of b that x leaves: J x = b has no solution. b is the sum of pieces, which may cancel.
+  const auto add = [&](const auto& system, const MatrixXd& x, std::initializer_list<MatrixXd> pieces) {
+    MatrixXd b = *pieces.begin();
+    if (pieces.size() > 1) b += *(pieces.begin() + 1);
+    if (b.rows() == 0) return;
+    const VectorXd& scale = system.row_scale();
+    const MatrixXd left = system.left(b, x);
+    for (Index k = 0; k < b.cols(); ++k) {
+      double size = 0;
+      for (const MatrixXd& piece : pieces) size += scale.cwiseProduct(piece.col(k)).norm();
+      if (left.col(k).norm() > kOpen * size + kRounding * scale.maxCoeff()) parameters.push_back(static_cast<int>(k));
+    }
+  };
   if (s.data.equilibrium) {
     const AssemblyEquations::Gradients F = s.position.gradients(s.result.y);
-    const MatrixXd J = F.y.leftCols(N);
-    const NearestPointLinearisation at(J, sizes_of_poses(J));
-    note_unmet(at.left(-F.rho), at.row_scale(), {F.rho}, s.data, unmet);
-  } else if (s.is_sparse()) {
-    const Solution::Sparse d = s.sparse_derivatives();
-    const MatrixXd q_rho = d.q.solve(d.q_b_rho, d.q_g_rho);
-    note_unmet(d.q.left(d.q_b_rho, q_rho), d.q.row_scale(), {d.q_b_rho}, s.data, unmet);
-    MatrixXd turned = MatrixXd::Zero(d.v_b_rho.rows(), P);
-    for (const SparseEntry& e : d.v_b_q) turned.row(e.row) += e.value * q_rho.row(e.column);
-    const MatrixXd b = turned + d.v_b_rho;
-    note_unmet(d.v.left(b, d.v.solve(b, d.v_g_rho)), d.v.row_scale(), {turned, d.v_b_rho}, s.data, unmet);
+    const MatrixXd J = F.y.leftCols(s.layout.positions());
+    const NearestPointLinearisation q(J, sizes_of_poses(J));
+    add(q, q.pseudo_inverse_times(-F.rho), {-F.rho});
   } else {
-    s.linearise_both();
-    const Solution::Derivatives d = s.derivatives();
-    const NearestPointLinearisation &q = s.q->linearisation, &v = s.v->linearisation;
-    note_unmet(q.left(d.q_b_rho), q.row_scale(), {d.q_b_rho}, s.data, unmet);
-    const MatrixXd turned = d.v_b_q * q.solve(d.q_b_rho, d.q_g_rho), b = turned + d.v_b_rho;
-    note_unmet(v.left(b), v.row_scale(), {turned, d.v_b_rho}, s.data, unmet);
+    s.with_systems([&](const auto& q, const auto& v, const Solution::Derivatives& d) {
+      const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho), turned = d.b_of(q_rho);
+      add(q, q_rho, {d.q_b_rho});
+      add(v, v.solve(turned + d.v_b_rho, d.v_g_rho), {turned, d.v_b_rho});
+    });
   }
-  std::vector<int> parameters;
-  for (Index k = 0; k < P; ++k) {
-    if (unmet[static_cast<std::size_t>(k)]) parameters.push_back(static_cast<int>(k));
-  }
+  std::ranges::sort(parameters);
+  parameters.erase(std::unique(parameters.begin(), parameters.end()), parameters.end());
   return parameters;
 }
 
 double Assembly::rounding() const {
   Solution& s = *solution_;
   if (!s.result.ok || s.data.equilibrium || s.data.n >= Solution::kManyBodies) return 0;
-  s.linearise_both();
-  const Solution::Derivatives d = s.derivatives();
-  const NearestPointLinearisation &q = s.q->linearisation, &v = s.v->linearisation;
-  const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho), v_g = d.v_g_q * q_rho + d.v_g_rho;
-  return std::max(q.rounding(q_rho, d.q_g_rho), v.rounding(v.solve(d.v_b_q * q_rho + d.v_b_rho, v_g), v_g));
+  double rounding = 0;
+  s.with_systems([&]<class System>(const System& q, const System& v, const Solution::Derivatives& d) {
+    if constexpr (std::is_same_v<System, NearestPointLinearisation>) {
+      const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho), v_g = d.g_of(q_rho) + d.v_g_rho;
+      const MatrixXd v_rho = v.solve(d.b_of(q_rho) + d.v_b_rho, v_g);
+      rounding = std::max(q.rounding(q_rho, d.q_g_rho), v.rounding(v_rho, v_g));
+    }
+  });
+  return rounding;
 }
 
 std::vector<std::string> Assembly::equilibrium_warnings() const {

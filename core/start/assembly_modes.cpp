@@ -153,7 +153,7 @@ std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, c
   for (int k = 1, fruitless = 0; k < kMost && fruitless < kFruitless; ++k) {
     if (go_on && !go_on()) break;
     AssemblyEquations equations(d, AssemblyLevel::position, t);
-    PositionProblem positions(equations);
+    AssemblyProblem positions(equations);
     VectorXd y = VectorXd::Zero(2 * guess.size());
     y.head(guess.size()) = turns.of(guess);
     equations.start_branches(y);

@@ -26,8 +26,10 @@ class NearestPointLinearisation {
   Eigen::Index rank() const { return J_transposed_.rank(); }
   const Eigen::VectorXd& row_scale() const { return scale_; }
   const Eigen::VectorXd& sizes() const { return sizes_; }
-  // Returns the part of b outside the range of J, rows of J scaled to unit length.
-  Eigen::MatrixXd left(const Eigen::MatrixXd& b) const { return scale_.asDiagonal() * (b - J_ * particular(b)); }
+  // Returns the residual b - J x, with rows of J scaled to unit length.
+  Eigen::MatrixXd left(const Eigen::MatrixXd& b, const Eigen::MatrixXd& x) const {
+    return scale_.asDiagonal() * (b - J_ * x);
+  }
   const Eigen::MatrixXd& null_space() const { return Z_; }      // Z
   Eigen::MatrixXd multipliers(const Eigen::MatrixXd& g) const;  // least nu with J'nu = g
   // Returns nu with J'nu = x_guess - x, as exact as x is: to eps of each unknown's size.
