@@ -7,15 +7,14 @@
 #include <complex>
 #include <limits>
 
-#include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/force/forces.hpp"
 #include "core/linear/dense.hpp"
+#include "core/mechanism/followed_angles.hpp"
 #include "core/projection/projection.hpp"
-#include "core/sensor/body_at.hpp"
-#include "core/start/assembly_equations.hpp"
+#include "core/start/assembly_problems.hpp"
 
 namespace mbsopt {
 namespace {
@@ -52,20 +51,6 @@ class Statics {
     length_ = length_at(at_rest_in(q_guess));
   }
 
-  // q_dir = T(p) xi, columns
-  MatrixXd to_q(const VectorXd& q, const MatrixXd& xi) const {
-    MatrixXd out(layout_.positions(), xi.cols());
-    for (int i = 1; i <= d_.n; ++i) {
-      const Vector4d p = q.segment<4>(layout_.p(i));
-      for (Index k = 0; k < xi.cols(); ++k) {
-        const Vec<6> of_body = xi.col(k).segment<6>(layout_.z(i));
-        out.col(k).segment<3>(layout_.q(i)) = of_body.head<3>();
-        out.col(k).segment<4>(layout_.p(i)) = 0.5 * G_transposed_times(p, of_body.tail<3>());
-      }
-    }
-    return out;
-  }
-
   bool evaluate(const VectorXd& q) {
     y_ = at_rest_in(q);
     if (!dynamics_.evaluate(t_, y_, angles_, ydot_)) return false;
@@ -78,7 +63,7 @@ class Statics {
 
   // Tangents of z: in the directions xi (6n x 6n identity), and in the parameters.
   MatrixXd z_of_positions() {
-    const MatrixXd directions = to_q(y_.head(layout_.positions()), MatrixXd::Identity(freedoms_, freedoms_));
+    const MatrixXd directions = rates_of_poses(y_.head(layout_.positions()), MatrixXd::Identity(freedoms_, freedoms_));
     MatrixXd out(freedoms_, freedoms_);
     const ParameterBlock none = block_without_parameters(d_);
     LaneRows y_dir(layout_.size(), kLanes), ydot_dir(layout_.size(), kLanes);
@@ -129,7 +114,7 @@ class Statics {
     equations_.start_branches(y_);
     const AssemblyEquations::Gradients g = equations_.gradients(y_);
     r.J = g.y.topLeftCorner(d_.m, layout_.positions()) *
-          to_q(y_.head(layout_.positions()), MatrixXd::Identity(freedoms_, freedoms_));
+          rates_of_poses(y_.head(layout_.positions()), MatrixXd::Identity(freedoms_, freedoms_));
     r.phi_rho = g.rho.topRows(d_.m);
     r.scale = r.J.rowwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
     r.J_scaled = OrthogonalDecomposition(r.scale.asDiagonal() * r.J, kRestRankThreshold);
@@ -155,11 +140,7 @@ class Statics {
     ProjectionSolution solution = projector_->solution();
     if (!projector_->project(t_, angles_, y_hat, y, solution)) return false;
     q = y.head(layout_.positions());
-    for (std::size_t k = 0; k < d_.angles.size(); ++k) {
-      const JointAngle& a = d_.angles[k];
-      double& angle = angles_(static_cast<Index>(k));
-      angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
-    }
+    continue_angles(d_, y, angles_);
     return true;
   }
 
@@ -176,7 +157,7 @@ class Statics {
   // Does evaluate() at q moved by xi.
   bool evaluate_beside(const VectorXd& q, const VectorXd& xi) {
     const VectorXd angles = angles_;
-    VectorXd beside = q + to_q(q, xi);
+    VectorXd beside = q + rates_of_poses(q, xi);
     const bool moved = settle(beside) && evaluate(beside);
     angles_ = angles;
     return moved;
@@ -270,7 +251,7 @@ struct FreeMotion {
 double error_along(Statics& statics, const FreeMotion& free, const OrthogonalDecomposition& damped, const VectorXd& y,
                    VectorXd& q) {
   const VectorXd from = q, change = free.stiffness * y;
-  const MatrixXd direction = statics.to_q(from, free.N * y);
+  const MatrixXd direction = rates_of_poses(from, free.N * y);
   const double size = statics.size_of(free.N * y);
   const int parts = 1 + static_cast<int>(size / kApart);
   double error = 0;
@@ -298,7 +279,7 @@ std::string go_downhill(Statics& statics, VectorXd& q, int& iterations) {
     const VectorXd newton = free.damped(0).solve(free.force), xi = free.N * newton;
     const double one_length = 1 / statics.size_of(free.N.rowwise().norm());
     if (statics.size_of(xi) < kTolerance && free.is_rounding(free.force - free.stiffness * newton, one_length)) {
-      q += statics.to_q(q, xi);
+      q += rates_of_poses(q, xi);
       return statics.settle(q) ? "" : "the joints cannot be kept closed there";
     }
     // A step is shorter than half the time in which the overdamped motion leaves an unstable equilibrium.
@@ -388,7 +369,7 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
     const MatrixXd right = NM * statics.mass_times(statics.z_of_parameters() + Z * particular);
     xi_rho += rows.N * OrthogonalDecomposition(reduced).solve(right);
   }
-  e.q_rho = statics.to_q(e.q, xi_rho);
+  e.q_rho = rates_of_poses(e.q, xi_rho);
   e.angles = statics.angles();
   e.ok = true;
   return e;

@@ -143,15 +143,9 @@ class MotionNames {
   }
 
   void set_jacobian() {
-    J_ = MatrixXd::Zero(d_.m, 6 * d_.n);
     ConstraintRows rows(d_);
     rows.evaluate(frames_);
-    for (const RowGroup& g : d_.groups) {
-      for (int r = 0; r < g.rows; ++r) {
-        if (g.body1 > 0) J_.block<1, 6>(g.row + r, layout_.z(g.body1)) += rows.J1.row(g.block + r);
-        if (g.body2 > 0) J_.block<1, 6>(g.row + r, layout_.z(g.body2)) += rows.J2.row(g.block + r);
-      }
-    }
+    J_ = rows.dense();
     for (Index r = 0; r < J_.rows(); ++r) {
       const double length = J_.row(r).norm();
       if (length > 0) J_.row(r) /= length;

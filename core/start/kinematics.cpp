@@ -7,11 +7,11 @@
 #include <cmath>
 #include <set>
 
-#include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/linear/dense.hpp"
+#include "core/start/assembly_problems.hpp"
 #include "core/start/driven_path.hpp"
 #include "core/start/free_motion.hpp"
 #include "core/start/law_jumps.hpp"
@@ -191,28 +191,17 @@ class Kinematics {
       before = now;
       move(rows_.solve(-phi));
     }
-    const VectorXd u = rows_.solve(-rows_.phi_dot());
-    const StateLayout layout{d_.n};
-    for (int i = 1; i <= d_.n; ++i) {
-      const Vec<6> of_body = u.segment<6>(layout.z(i));
-      y_.segment<3>(layout.v(i)) += of_body.head<3>();
-      y_.segment<4>(layout.pdot(i)) +=
-          0.5 * G_transposed_times(Vector4d(y_.segment<4>(layout.p(i))), of_body.tail<3>());
-    }
+    const Index half = y_.size() / 2;
+    y_.tail(half) += rates_of_poses(y_.head(half), rows_.solve(-rows_.phi_dot()));
     path_.improve(y_);
   }
   void move(const VectorXd& delta) {
     const StateLayout layout{d_.n};
+    y_.head(layout.positions()) += rates_of_poses(y_.head(layout.positions()), delta);
     for (int i = 1; i <= d_.n; ++i) {
-      const Vec<6> of_body = delta.segment<6>(layout.z(i));
-      y_.segment<3>(layout.q(i)) += of_body.head<3>();
-      Vector4d p = y_.segment<4>(layout.p(i));
-      p += 0.5 * G_transposed_times(p, of_body.tail<3>());
+      auto p = y_.segment<4>(layout.p(i)), pdot = y_.segment<4>(layout.pdot(i));
       p.normalize();
-      Vector4d pdot = y_.segment<4>(layout.pdot(i));
       pdot -= p * p.dot(pdot);
-      y_.segment<4>(layout.p(i)) = p;
-      y_.segment<4>(layout.pdot(i)) = pdot;
     }
   }
 
