@@ -55,9 +55,10 @@ TEST_CASE("the nearest point of a circle lies on the ray through the guess, from
   const double size = GENERATE(0.05, 0.4, 1.0, 1.7, 4.0, 20.0);
   const int copies = GENERATE(1, 3);  // redundant equations change nothing
   Equations circle = ellipse(1, copies);
-  const NearestPoint found = nearest_point(circle, size * point(0.6, 0.8));
+  NearestPoint found = nearest_point(circle, size * point(0.6, 0.8));
   REQUIRE(found.status == NearestPointStatus::found);
   CHECK((found.x - point(0.6, 0.8)).norm() < 1e-15);
+  linearise(circle, found);
   CHECK(found.linearisation.rank() == 1);
 }
 
