@@ -20,15 +20,19 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostBodies = 60;   // dense decompositions of 6n columns stay within a second
-constexpr double kReach = 100;    // times the tolerance: pivots of J up to this may be rounding
+constexpr int kMostBodies = 60;  // dense decompositions of 6n columns stay within a second
+// Pivots of J up to this, times the tolerance, may be rounding. Smaller ones follow where that is too much, as for
+// short links.
+constexpr double kReaches[] = {100, 10, 1};
 constexpr double kExact = 1e-12;  // what agrees as well has all digits
 
 // The joints' equations. Lengths are in units of the mechanism's. Rows that tie joints or drive them are left out.
 class Loops {
  public:
-  Loops(const MechanismData& data, double tolerance)
-      : d_(data), threshold_(kReach * tolerance), lengths_(joint_lengths(data)), constant_(VectorXd::Zero(data.m)) {
+  enum class Outcome { exact, moved, none };
+
+  Loops(const MechanismData& data, double threshold)
+      : d_(data), threshold_(threshold), lengths_(joint_lengths(data)), constant_(VectorXd::Zero(data.m)) {
     std::vector<int> terms(at(d_.m), 0);
     for (const Constraint& c : d_.constraints) ++terms[at(c.row)];
     for (const Constraint& c : d_.constraints) {
@@ -41,13 +45,15 @@ class Loops {
     direction_ = VectorXd::Zero(6 * d_.n);
   }
 
-  // Returns whether there is something to move, and x.
-  bool search() {
+  // Finds x, unless the numbers have all digits.
+  Outcome search() {
     constexpr int kBatches = 8, kBatch = 6;
     std::vector<Position> all(1);
     all[0].q.resize(7 * d_.n);
     for (int i = 1; i <= d_.n; ++i) all[0].q.segment<7>(7 * (i - 1)) = d_.bodies[at(i)].q;
-    if (agrees_at_sight(all[0]) || !close(all[0]) || all[0].L.cols() == 0 || agrees(all[0])) return false;
+    if (agrees_at_sight(all[0])) return Outcome::exact;
+    if (!close(all[0])) return Outcome::none;
+    if (all[0].L.cols() == 0 || agrees(all[0])) return Outcome::exact;
     redundant_ = all[0].L.cols();
     for (int batch = 0; batch < kBatches; ++batch) {
       std::vector<Position> fresh;
@@ -59,15 +65,15 @@ class Loops {
           here = all[0], direction_.setZero();
         }
       }
-      if (fresh.size() < kBatch) return false;
+      if (fresh.size() < kBatch) return Outcome::none;
       for (const Position& p : fresh) redundant_ = std::min(redundant_, p.L.cols());
       const bool agree = std::ranges::all_of(fresh, [&](const Position& p) { return !is_regular(p) || agrees(p); });
-      if (redundant_ == 0 || (agree && batch == 0)) return false;  // the start is next to a singular position
-      all.insert(all.end(), fresh.begin(), fresh.end());           // also if they agree: their last digits count
-      if (!fit(all)) return false;
-      if (agree) return true;
+      if (redundant_ == 0 || (agree && batch == 0)) return Outcome::exact;  // the start is next to a singular position
+      all.insert(all.end(), fresh.begin(), fresh.end());  // also if they agree: their last digits count
+      if (!fit(all)) return Outcome::none;
+      if (agree) return Outcome::moved;
     }
-    return false;
+    return Outcome::none;
   }
 
   RoundedLoops finding() {
@@ -292,11 +298,15 @@ JointLengths joint_lengths(const MechanismData& data) {
 
 void close_rounded_loops(MechanismData& data, double tolerance) {
   if (!(tolerance > 0) || data.n == 0 || data.n > kMostBodies || !closes_loops(data)) return;
-  Loops loops(data, tolerance);
-  if (!loops.search()) return;
-  data.rounded = loops.finding();
-  data.rounded.made = data.rounded.part <= tolerance;
-  if (data.rounded.made) loops.write(data.constraints);
+  for (const double reach : kReaches) {
+    Loops loops(data, reach * tolerance);
+    const Loops::Outcome outcome = loops.search();
+    if (outcome == Loops::Outcome::none) continue;
+    if (outcome == Loops::Outcome::exact) return;
+    data.rounded = loops.finding();
+    data.rounded.made = data.rounded.part <= tolerance;
+    if (data.rounded.made) return loops.write(data.constraints);
+  }
 }
 
 std::string in_words(const MechanismData& data) {
