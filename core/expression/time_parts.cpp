@@ -150,17 +150,20 @@ std::vector<double> jumps_of(const Program& part, int time, std::vector<double> 
     double t0 = pieces[i - 1], t1 = pieces[i];
     if (t1 - t0 > kNarrow * (pieces.back() - pieces.front())) continue;
     double f0 = value(t0), f1 = value(t1);
+    const double change = std::abs(f1 - f0);
     for (double t = std::midpoint(t0, t1); t > t0 && t < t1; t = std::midpoint(t0, t1)) {
       const double f = value(t);
       if (std::abs(f - f0) < std::abs(f1 - f)) {
         t0 = t, f0 = f;
       } else {
         t1 = t;
-        if (!std::isfinite(f)) break;  // abs(x)/x has no value at its jump
+        if (std::isnan(f)) break;  // abs(x)/x has no value at its jump
         f1 = f;
       }
     }
-    if (std::abs(f1 - f0) > kFlat * size) jumps.push_back(t1);
+    // At a pole it grows, and beside one it falls.
+    const double jump = std::abs(f1 - f0);
+    if (jump > kFlat * size && jump >= 0.5 * change && jump <= 2 * change) jumps.push_back(t1);
   }
   return jumps;
 }

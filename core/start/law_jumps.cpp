@@ -8,9 +8,10 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kJump = 1e-9;            // relative to the law; below it a difference has vanished
-constexpr double kRoundingOfLaw = 1e-12;  // [m, rad, and these per s]: of 1 in exp(t) - 1
-constexpr double kPart = 0.471;           // not half: jumps are at round times, where a law may have no value
+constexpr double kJump = 1e-9;               // relative to the law; below it a difference has vanished
+constexpr double kRoundingOfLaw = 1e-12;     // [m, rad, and these per s]: of 1 in exp(t) - 1
+constexpr double kWide = 16, kSteep = 0.25;  // an interval, of the shortest; a change without jump falls by more
+constexpr double kPart = 0.471;              // not half: jumps are at round times, where a law may have no value
 
 std::string drive_of(const MechanismData& d, const RowLaw& law) {
   return law.drive >= 0 ? d.drive_names[static_cast<std::size_t>(law.drive)] : "?";
@@ -44,14 +45,14 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1)
   double size = std::max({std::abs(value(a)), std::abs(value(b)), (t1 - t0) * (std::abs(rate(a)) + std::abs(rate(b)))});
   if (what == Of::f_t) size = std::max(size, std::max(std::abs(a.f), std::abs(b.f)) / (t1 - t0));
   const double shortest = 1e-14 * std::max(std::abs(t0), std::abs(t1));
+  double wide = 0;  // the change over the last interval that is not yet so short
   while (true) {
     const double left = difference(a, b, t1 - t0);
     if (!std::isfinite(left) || std::abs(left) <= std::max(kJump * size, kRoundingOfLaw)) return {};
-    const double middle = t0 + kPart * (t1 - t0);
-    if (t1 - t0 <= shortest || middle <= t0 || middle >= t1) {
-      const double jump = value(b) - value(a), at_its_rate = (t1 - t0) * std::max(std::abs(rate(a)), std::abs(rate(b)));
-      return std::abs(jump) > 2 * at_its_rate ? Jump{t1, jump} : Jump{};
-    }
+    const double middle = t0 + kPart * (t1 - t0), change = value(b) - value(a);
+    if (t1 - t0 <= shortest || middle <= t0 || middle >= t1)
+      return std::abs(change) > kSteep * wide ? Jump{t1, change} : Jump{};
+    if (t1 - t0 > kWide * shortest) wide = std::abs(change);
     const TimeLaw::Jet m = at(law, middle);
     if (std::abs(difference(a, m, middle - t0)) >= std::abs(difference(m, b, t1 - middle))) {
       t1 = middle, b = m;

@@ -47,7 +47,7 @@ RunGuard::RunGuard(const MechanismData& data)
     : data_(data), conserves_energy_(conserves_energy(data)), law_jumps_(data) {}
 
 std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps) {
-  last_t_ = t;
+  before_t_ = last_t_ = t;
   energy_initial_ = energy.kinetic + energy.potential;
   energy_drift_ = 0;
   energy_largest_ = size_of(energy);
@@ -104,8 +104,8 @@ std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {
 
 std::string RunGuard::objection(double t, const Eigen::VectorXd& y, const Energy& energy,
                                 double acceleration_residual) {
-  std::string words = law_jumps_.between(last_t_, t);
-  last_t_ = t;
+  std::string words = law_jumps_.between(before_t_, t);  // from one step before: this one may begin at a jump
+  before_t_ = last_t_, last_t_ = t;
   if (words.empty() && acceleration_residual > kUnmetAcceleration) {
     words = fmt::format(
         "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: the linkage locks there (a "

@@ -36,7 +36,7 @@ class RunGuard {
   const MechanismData& data_;
   bool conserves_energy_;
   LawJumps law_jumps_;
-  double last_t_ = 0;
+  double last_t_ = 0, before_t_ = 0;
   Eigen::VectorXd last_y_;
   double energy_initial_ = 0, energy_largest_ = 0, energy_natural_ = 0;  // natural: of weights and springs [J]
   double energy_drift_ = 0;
