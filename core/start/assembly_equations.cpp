@@ -101,8 +101,8 @@ void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) 
     if (!g.shared) continue;
     double sum = 0;
     const Constraint* last = nullptr;
-    for (const Constraint& c : data_.constraints) {
-      if (c.row != g.row) continue;
+    for (const Constraint& c :
+         std::ranges::equal_range(data_.constraints, g.row, {}, &Constraint::row)) {  // they ascend
       sum += term_value(c, y, angles);
       if (std::holds_alternative<Angle>(c.primitive)) last = &c;
     }
