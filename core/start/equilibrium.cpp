@@ -61,15 +61,14 @@ class Statics {
     return z_.allFinite();
   }
 
-  // Tangents of z: in the directions xi (6n x 6n identity), and in the parameters.
-  MatrixXd z_of_positions() {
-    const MatrixXd directions = rates_of_poses(y_.head(layout_.positions()), MatrixXd::Identity(freedoms_, freedoms_));
-    MatrixXd out(freedoms_, freedoms_);
+  // Tangents of z: along the columns of xi, and in the parameters.
+  MatrixXd z_along(const MatrixXd& xi) {
+    const MatrixXd directions = rates_of_poses(y_.head(layout_.positions()), xi);
+    MatrixXd out(freedoms_, xi.cols());
     const ParameterBlock none = block_without_parameters(d_);
-    LaneRows y_dir(layout_.size(), kLanes), ydot_dir(layout_.size(), kLanes);
-    for (Index first = 0; first < freedoms_; first += kLanes) {
-      y_dir.setZero();
-      const Index lanes = std::min<Index>(kLanes, freedoms_ - first);
+    LaneRows y_dir = LaneRows::Zero(layout_.size(), kLanes), ydot_dir(layout_.size(), kLanes);
+    for (Index first = 0; first < xi.cols(); first += kLanes) {
+      const Index lanes = std::min<Index>(kLanes, xi.cols() - first);
       y_dir.topLeftCorner(layout_.positions(), lanes) = directions.middleCols(first, lanes);
       dynamics_.tangent(none, y_dir, ydot_dir);
       Index row = 0;
@@ -94,32 +93,18 @@ class Statics {
     return out;
   }
 
-  // J, its null space and Phi_rho at y.
-  struct Rows {
-    MatrixXd J, N, phi_rho;
-    OrthogonalDecomposition J_scaled;
-    VectorXd scale;
-    MatrixXd particular(const MatrixXd& b) const {  // J xi = b
-      if (J.rows() == 0) return MatrixXd::Zero(N.rows(), b.cols());
-      return J_scaled.solve(scale.asDiagonal() * b);
-    }
-  };
-  Rows rows() {
-    Rows r;
-    if (d_.m == 0) {
-      r.J.resize(0, freedoms_), r.phi_rho.resize(0, d_.rho.size());
-      r.N.setIdentity(freedoms_, freedoms_);
-      return r;
-    }
+  // A basis of the motions xi that joints and drives leave free: J xi = 0.
+  MatrixXd free_motions() {
+    if (d_.m == 0) return MatrixXd::Identity(freedoms_, freedoms_);
+    return null_space(unit_rows(), kRestRankThreshold);
+  }
+  // xi_p': the motion with the parameters that the joints ask for. J xi_p' = -Phi_rho
+  MatrixXd motion_of_parameters() {
+    if (d_.m == 0) return MatrixXd::Zero(freedoms_, d_.rho.size());
     equations_.start_branches(y_);
-    const AssemblyEquations::Gradients g = equations_.gradients(y_);
-    r.J = g.y.topLeftCorner(d_.m, layout_.positions()) *
-          rates_of_poses(y_.head(layout_.positions()), MatrixXd::Identity(freedoms_, freedoms_));
-    r.phi_rho = g.rho.topRows(d_.m);
-    r.scale = r.J.rowwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
-    r.J_scaled = OrthogonalDecomposition(r.scale.asDiagonal() * r.J, kRestRankThreshold);
-    r.N = null_space(r.scale.asDiagonal() * r.J, kRestRankThreshold);
-    return r;
+    const MatrixXd phi_rho = equations_.gradients(y_).rho.topRows(d_.m);
+    const OrthogonalDecomposition J(unit_rows(), kRestRankThreshold);
+    return J.solve(scale_.asDiagonal() * -phi_rho);
   }
 
   MatrixXd mass_times(const MatrixXd& x) const {
@@ -183,6 +168,13 @@ class Statics {
   }
 
  private:
+  // J with rows of unit length; scale_ makes it from J.
+  MatrixXd unit_rows() {
+    const MatrixXd J = dynamics_.solver().rows().dense();
+    scale_ = J.rowwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
+    return scale_.asDiagonal() * J;
+  }
+
   // y = (q, 0)
   VectorXd at_rest_in(const VectorXd& q) const {
     VectorXd y = VectorXd::Zero(layout_.size());
@@ -213,7 +205,7 @@ class Statics {
   SpatialDynamics dynamics_;
   std::unique_ptr<Projector> projector_;
   AssemblyEquations equations_;
-  VectorXd angles_, y_, ydot_, z_;
+  VectorXd angles_, y_, ydot_, z_, scale_;
 };
 
 // N'M (sigma I - Z) N y = N'M z at one position. N is orthonormal in M, so that sigma y is a force.
@@ -223,14 +215,14 @@ struct FreeMotion {
   bool regular = true;          // N'M N is
   double growth = 0;            // of the overdamped motion y' = -stiffness y; 0 if it decays
 
-  explicit FreeMotion(Statics& statics) : N(statics.rows().N) {
+  explicit FreeMotion(Statics& statics) : N(statics.free_motions()) {
     if (N.cols() == 0) return;
     const MatrixXd L = cholesky_factor(N.transpose() * statics.mass_times(N));
     regular = L.size() > 0;
     if (!regular) return;
     N = N * inverse(L).transpose();
     NM = statics.mass_times(N).transpose();
-    stiffness = -NM * (statics.z_of_positions() * N);
+    stiffness = -NM * statics.z_along(N);
     force = NM * statics.z();
     force_terms = N.cwiseAbs().transpose() * statics.loads().cwiseAbs();
     if (cholesky_factor(stiffness + stiffness.transpose()).size() == 0)
@@ -360,14 +352,12 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
   };
   if (const std::string why = go_downhill(statics, e.q, e.iterations); !why.empty()) return fail(why);
   if (!statics.evaluate(e.q)) return fail("the accelerations cannot be computed there");
-  const Statics::Rows rows = statics.rows();
-  const MatrixXd particular = rows.particular(-rows.phi_rho);
+  const MatrixXd N = statics.free_motions(), particular = statics.motion_of_parameters();
   MatrixXd xi_rho = particular;
-  if (rows.N.cols() > 0) {
-    const MatrixXd Z = statics.z_of_positions(), NM = rows.N.transpose();
-    const MatrixXd reduced = NM * statics.mass_times(-(Z * rows.N));
-    const MatrixXd right = NM * statics.mass_times(statics.z_of_parameters() + Z * particular);
-    xi_rho += rows.N * OrthogonalDecomposition(reduced).solve(right);
+  if (N.cols() > 0) {
+    const MatrixXd NM = statics.mass_times(N).transpose();
+    const MatrixXd right = NM * (statics.z_of_parameters() + statics.z_along(particular));
+    xi_rho += N * OrthogonalDecomposition(-NM * statics.z_along(N)).solve(right);
   }
   e.q_rho = rates_of_poses(e.q, xi_rho);
   e.angles = statics.angles();
