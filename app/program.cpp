@@ -12,7 +12,7 @@
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/standard_streams.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 int run_program(const std::vector<std::string>& arguments, const NamedTerms& terms) {
   open_missing_standard_streams();
@@ -30,4 +30,4 @@ int run_program(const std::vector<std::string>& arguments, const NamedTerms& ter
   return exit_code;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

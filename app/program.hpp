@@ -13,11 +13,11 @@
 
 #include "optim/problem/named_terms.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // arguments hold the command, then its file and options. Results go into the folder of the run and to standard output,
 // messages on faults to standard error. Returns the exit code: 0 done, 1 a numerical failure, 2 bad input, 3 a failed
 // check, 130 interrupted.
 int run_program(const std::vector<std::string>& arguments, const NamedTerms& terms = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints what docs/architecture.md promises, measured: lines, types and files of each folder, and which includes break
-the order of its table. Exit code 1 where one does, where files include each other in a circle, or where a page or a
-comment names a file that does not exist.
+the order of its table. Exit code 1 where one does, where files include each other in a circle, where a file is not in
+the namespace of its folder, or where a page or a comment names a file that does not exist.
 
     docs/architecture.py              run from anywhere; needs Python 3 alone
 """
@@ -18,6 +18,8 @@ TYPE = re.compile(r"^ *(?:template *<.*> *)?(?:struct|class|enum class) +(\w+)(?
 # A path as pages and comments write it; some leave the ending out, and some stand for several files.
 PATH = re.compile(r"(?<![\w/.])(?:core|optim|app|tests|bench|docs|problems|data|examples|cmake)/"
                   r"[\w./-]*\w(?![\w{*-]|/?[{*])")
+NAMESPACE = re.compile(r"^namespace (mbsopt[\w:]*(?: \w+)?) \{", re.M)
+NAMESPACES = {"core": "mbsopt", "optim": "mbsopt::inline optim", "app": "mbsopt::inline app"}
 ENDINGS = ("", ".hpp", ".cpp", ".md", ".py", ".json")
 
 
@@ -79,6 +81,9 @@ def main():
         count[0] += 1
         count[1] += content.count("\n")
         count[2] += len(TYPE.findall(content))
+        namespace = NAMESPACES[file.split("/")[0]]
+        wrong += [f"{file} is in namespace {other}, not {namespace}"
+                  for other in set(NAMESPACE.findall(content)) if not re.fullmatch(namespace + r"(::\w+)?", other)]
         for other in INCLUDE.findall(content):
             if node(other) != node(file):
                 includes[node(file)].add(node(other))
@@ -90,8 +95,13 @@ def main():
     for name in sorted(counts, key=lambda f: order.index(f) if f in order else len(order)):
         print(f"{name:<20}{counts[name][0]:>6}{counts[name][1]:>8}{counts[name][2]:>7}")
     print(f"{'all':<20}" + "".join(f"{sum(c[k] for c in counts.values()):>{w}}" for k, w in enumerate((6, 8, 7))))
+    for top in NAMESPACES:
+        print(f"{top:<26}{sum(c[1] for name, c in counts.items() if name.split('/')[0] == top):>8}")
+    scripts = sum(path.read_text().count("\n") for ending in ("js", "css", "in")
+                  for path in (ROOT / "app").rglob(f"*.{ending}"))
+    print(f"{'scripts and styles of app':<26}{scripts:>8}")
     wrong += stale_names()
-    well = "no include against the order of docs/architecture.md, no circle, no stale path"
+    well = "no include against the order of docs/architecture.md, no circle, no stale path, no foreign namespace"
     print("\n".join(wrong) if wrong else well)
     return 1 if wrong else 0
 

@@ -14,7 +14,7 @@
 #include "optim/check/gradient_check.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 struct ComparedMethod {
@@ -242,4 +242,4 @@ int check_command(const CommandContext& context) {
   return run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

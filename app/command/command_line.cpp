@@ -23,7 +23,7 @@
 #include "core/mechanism/mechanism.hpp"
 #include "optim/problem/csv_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // "help" is --help, "help design" is design --help.
@@ -171,4 +171,4 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
   return flushed(exit_code, out, err);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

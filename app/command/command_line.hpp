@@ -7,7 +7,7 @@
 
 #include "optim/problem/named_terms.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct CommandOptions;
 struct Ranks;
@@ -20,4 +20,4 @@ CommandOptions options_of(const std::vector<std::string>& arguments);
 int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
                      bool err_is_terminal = false, Ranks* ranks = nullptr, const NamedTerms& terms = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -10,7 +10,7 @@
 #include "app/command/starter_files.hpp"
 #include "core/expression/did_you_mean.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 void add_run_options(CLI::App& sub, CommandOptions& options) {
@@ -199,4 +199,4 @@ void add_commands(CLI::App& app, CommandOptions& options) {
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -12,7 +12,7 @@ namespace CLI {
 class App;
 }
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct Command {
   std::string_view name;
@@ -27,4 +27,4 @@ std::vector<std::string> command_names();
 // Registers the commands with the parser, with their options.
 void add_commands(CLI::App& app, CommandOptions& options);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

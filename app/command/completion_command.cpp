@@ -8,7 +8,7 @@
 #include "app/command/command_table.hpp"
 #include "app/terminal/exit_code.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // "auto tlm adjoint" of an option that takes one of these words: its type is "TEXT:{auto,tlm,adjoint}".
@@ -67,4 +67,4 @@ complete -o filenames -F _mbsopt mbsopt
   return kDone;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -19,7 +19,7 @@
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 void print_design(std::ostream& out, const DesignResult& design, const ObjectiveUnits& units,
@@ -261,4 +261,4 @@ int design_command(const CommandContext& context) {
   return long_run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

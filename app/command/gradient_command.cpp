@@ -20,7 +20,7 @@
 #include "optim/objective/hessian.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 const std::map<std::string, GradientMethod> kMethods{{"auto", GradientMethod::automatic},
@@ -189,4 +189,4 @@ int gradient_command(const CommandContext& context) {
   return run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

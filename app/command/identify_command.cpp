@@ -37,7 +37,7 @@
 #include "optim/fit/windows.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 std::string without_unit(const std::string& column) { return column.substr(0, column.find(" [")); }
@@ -380,4 +380,4 @@ int identify_command(const CommandContext& context) {
   return long_run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -9,7 +9,7 @@
 #include "app/terminal/exit_code.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 int import_command(const CommandContext& context) {
   namespace fs = std::filesystem;
@@ -28,4 +28,4 @@ int import_command(const CommandContext& context) {
   return kDone;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

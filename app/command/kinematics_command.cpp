@@ -17,7 +17,7 @@
 #include "core/scene/kinematic_scene.hpp"
 #include "core/start/kinematics.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 Scene prescribed(const Scene& scene) {
@@ -152,4 +152,4 @@ int kinematics_command(const CommandContext& context) {
   return run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

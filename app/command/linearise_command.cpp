@@ -17,7 +17,7 @@
 #include "core/simulate/simulation.hpp"
 #include "core/start/linearisation.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr double kWrongDigits = 1e-6;  // of an eigenvalue: larger errors are reported
@@ -214,4 +214,4 @@ int linearise_command(const CommandContext& context) {
   return run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -10,7 +10,7 @@
 #include "app/run/command.hpp"
 #include "app/terminal/exit_code.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 int new_command(const CommandContext& context) {
   namespace fs = std::filesystem;
@@ -27,4 +27,4 @@ int new_command(const CommandContext& context) {
   return kDone;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

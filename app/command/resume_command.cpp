@@ -10,7 +10,7 @@
 #include "app/run/command.hpp"
 #include "app/terminal/exit_code.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 int nothing_left(const CommandContext& context, const std::string& command, const std::string& ended) {
@@ -71,4 +71,4 @@ int resume_command(const CommandContext& context) {
       fmt::format("{}: belongs to '{}', which cannot be resumed", (folder / kJournalFile).string(), command));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

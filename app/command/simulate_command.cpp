@@ -10,7 +10,7 @@
 #include "app/terminal/text_table.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 void add_objectives(Run& run, const SimulatedMotion& motion) {
@@ -67,4 +67,4 @@ int simulate_command(const CommandContext& context) {
   return run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct StarterFile {
   std::string_view name, text;
@@ -17,4 +17,4 @@ struct Starter {
 
 std::span<const Starter> starters();
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -15,7 +15,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // Point, varied parameters, objectives with their true extremes, gradients. Points without values have empty cells.
@@ -113,4 +113,4 @@ int sweep_command(const CommandContext& context) {
   return long_run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

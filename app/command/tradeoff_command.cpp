@@ -13,7 +13,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "optim/fit/windows.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 TradeoffOptions options_of(Run& run) {
@@ -108,4 +108,4 @@ int tradeoff_command(const CommandContext& context) {
   return run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -12,7 +12,7 @@
 #include "optim/fit/windows.hpp"
 #include "optim/problem/parameter_uses.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 void add_parameters(Run& run) {
@@ -72,4 +72,4 @@ int validate_command(const CommandContext& context) {
   return run.finish();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

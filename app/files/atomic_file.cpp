@@ -11,7 +11,7 @@
 
 #include "optim/machine/write_all.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::string_view kPart = ".part";
@@ -77,4 +77,4 @@ bool is_part_of(std::string_view part, std::string_view file) {
   return std::all_of(process.begin(), process.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

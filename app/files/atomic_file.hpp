@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // A file or folder that must not or cannot be used, with the reason.
 class OutputError : public std::runtime_error {
@@ -31,4 +31,4 @@ void refuse_to_overwrite(const std::filesystem::path& path, std::string_view com
 // killed.
 bool is_part_of(std::string_view part, std::string_view file);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -11,7 +11,7 @@
 
 #include "app/files/atomic_file.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 FolderLock::FolderLock(const std::filesystem::path& folder)
     : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
@@ -33,4 +33,4 @@ FolderLock::~FolderLock() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

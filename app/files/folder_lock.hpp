@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class FolderLock {
  public:
@@ -21,4 +21,4 @@ class FolderLock {
   bool held_ = false;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -15,7 +15,7 @@
 #include "optim/machine/write_all.hpp"
 #include "optim/problem/regular_file.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr int kJournalVersion = 4;
@@ -197,4 +197,4 @@ bool Journal::exists() const {
   return ::fstat(descriptor_, &file) == 0 && file.st_nlink > 0;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -28,7 +28,7 @@
 
 #include "app/files/result_json.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 inline constexpr const char* kJournalFile = "journal.jsonl";
 
@@ -73,4 +73,4 @@ class Journal {
   std::chrono::steady_clock::time_point flushed_at_ = std::chrono::steady_clock::now();
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

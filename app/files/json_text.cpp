@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 Json read_json(std::string_view text) { return Json::parse(text); }
 Json read_json_or_discarded(std::string_view text) { return Json::parse(text, nullptr, false); }
@@ -35,4 +35,4 @@ Eigen::MatrixXd matrix_in(const Json& json, Eigen::Index rows, Eigen::Index colu
   return m;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

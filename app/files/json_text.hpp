@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 using Json = nlohmann::ordered_json;
 
@@ -26,4 +26,4 @@ Json rows_of(const Eigen::MatrixXd& m);
 Eigen::VectorXd vector_in(const Json& json);
 Eigen::MatrixXd matrix_in(const Json& json, Eigen::Index rows, Eigen::Index columns);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

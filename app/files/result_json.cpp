@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::array kOrder{"program",     "version",        "command",    "problem",         "status",
@@ -81,4 +81,4 @@ std::string result_json_text(const Json& parts) {
   return json_text(ordered, 2) + "\n";
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

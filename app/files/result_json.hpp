@@ -8,7 +8,7 @@
 #include "core/mechanism/mechanism.hpp"
 #include "core/simulate/simulation.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 Json to_json(const ModelSummary& summary);
 Json to_json(const SimulationStatistics& statistics);
@@ -23,4 +23,4 @@ Json bound_json(bool lower, bool upper);
 // The parts of a run's result, as text in the order of docs/cli.md.
 std::string result_json_text(const Json& parts);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -6,7 +6,7 @@
 #include <array>
 #include <new>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string sha256_of(std::string_view text) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
@@ -15,4 +15,4 @@ std::string sha256_of(std::string_view text) {
   return fmt::format("{:02x}", fmt::join(digest.begin(), digest.begin() + size, ""));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -3,8 +3,8 @@
 #include <string>
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string sha256_of(std::string_view text);  // lower-case hex
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

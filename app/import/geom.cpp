@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Eigen::Vector3d;
@@ -59,4 +59,4 @@ ImportedShape shape_of(const Geom& g) {
   return {g.type == "capsule" ? "rod" : "cylinder", g.at * Vector3d(-half), g.at * half, g.size(0)};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

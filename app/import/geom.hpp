@@ -3,7 +3,7 @@
 
 #include "app/import/imported_model.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct Geom {
   std::string type;                                // sphere, capsule, cylinder, ellipsoid, box
@@ -24,4 +24,4 @@ Eigen::Vector3d unit_inertia(const Geom& geom);
 // A box becomes a bar along its longest side, as wide as the longer of its other two sides.
 ImportedShape shape_of(const Geom& geom);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

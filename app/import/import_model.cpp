@@ -11,7 +11,7 @@
 #include "core/start/model_warnings.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // Returns the problem. Findings about a body or a joint name their element of the model.
@@ -93,4 +93,4 @@ ImportedProblem read_model_text(const std::string& text, const std::filesystem::
   return imported_from(text, model, [](const Problem&, const ImportedModel&) { return std::vector<std::string>{}; });
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

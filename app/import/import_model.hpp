@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct ImportedProblem {
   std::string name;                   // the model's name, used for the file
@@ -24,4 +24,4 @@ ImportedProblem import_model(const std::filesystem::path& model);
 // Reads the same from a text, without warnings: it assembles no mechanism. `model` names the file in findings.
 ImportedProblem read_model_text(const std::string& text, const std::filesystem::path& model);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

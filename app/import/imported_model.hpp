@@ -9,7 +9,7 @@
 
 #include "app/import/model_file.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct ImportedShape {
   std::string type;          // as in a problem file: rod, box, sphere, cylinder
@@ -61,4 +61,4 @@ struct ImportedModel {
 ImportedModel urdf_model(ModelFile& file);  // <robot>
 ImportedModel mjcf_model(ModelFile& file);  // <mujoco>
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -9,7 +9,7 @@
 #include "app/import/geom.hpp"
 #include "app/import/model_builder.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Eigen::Isometry3d;
@@ -439,4 +439,4 @@ class MjcfReader : ModelBuilder {
 
 ImportedModel mjcf_model(ModelFile& file) { return MjcfReader(file).read(); }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -6,7 +6,7 @@
 
 #include "core/scene/inertia_check.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -92,4 +92,4 @@ ImportedModel ModelBuilder::finished() {
   return std::move(model_);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -7,7 +7,7 @@
 #include "app/import/imported_model.hpp"
 #include "app/import/unique_names.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // A rotation about a coordinate axis, 0 to 2.
 inline Eigen::Matrix3d rotation(int axis, double angle) {
@@ -50,4 +50,4 @@ class ModelBuilder {
   UniqueNames joint_names_{UniqueNames::Kind::name, {}, &model_.changed};
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

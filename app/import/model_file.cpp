@@ -9,7 +9,7 @@
 #include <cmath>
 #include <sstream>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 std::size_t offset(const pugi::xml_node& node) { return static_cast<std::size_t>(node.offset_debug() - 1); }  // its "<"
@@ -183,4 +183,4 @@ std::vector<std::string> ModelFile::dropped() const {
   return list;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

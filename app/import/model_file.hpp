@@ -18,7 +18,7 @@
 #include "app/json/input_error.hpp"
 #include "app/json/source_text.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 constexpr int kWord = 0;       // a text
 constexpr int kList = -1;      // one number or more
@@ -87,4 +87,4 @@ struct ModelFile {
   std::vector<Finding> findings;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

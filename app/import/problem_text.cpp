@@ -11,7 +11,7 @@
 #include "core/expression/expression.hpp"
 #include "core/scene/type_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Eigen::Matrix3d;
@@ -216,4 +216,4 @@ std::string problem_text(ImportedModel& model) {
   return "{\n" + text + "\n}\n";
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

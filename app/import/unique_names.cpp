@@ -6,7 +6,7 @@
 
 #include "core/expression/operation.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string UniqueNames::add(const std::string& wanted) {
   const bool identifier = kind_ == Kind::identifier;
@@ -27,4 +27,4 @@ std::string UniqueNames::add(const std::string& wanted) {
   return name;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

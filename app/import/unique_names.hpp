@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class UniqueNames {
  public:
@@ -21,4 +21,4 @@ class UniqueNames {
   std::vector<std::string>* renamed_;  // nullptr: none is told
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

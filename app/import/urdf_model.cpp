@@ -6,7 +6,7 @@
 #include "app/import/geom.hpp"
 #include "app/import/model_builder.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Eigen::Isometry3d;
@@ -201,4 +201,4 @@ class UrdfReader : ModelBuilder {
 
 ImportedModel urdf_model(ModelFile& file) { return UrdfReader(file).read(); }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

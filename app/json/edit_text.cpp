@@ -10,7 +10,7 @@
 #include "app/json/findings.hpp"
 #include "app/json/parse_json.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -98,4 +98,4 @@ std::string with_parameter_values(const std::string& text, const std::map<std::s
   return result;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

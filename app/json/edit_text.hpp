@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // Returns the text with the value at a path (in the form of --set) replaced by `json`. It adds missing objects on the
 // way. Throws InputError if the text is not JSON or the path leads nowhere.
@@ -20,4 +20,4 @@ std::string with_override(const std::string& text, const std::string& override_t
 // Replaces the value of each named parameter by a number in SI with 17 significant digits.
 std::string with_parameter_values(const std::string& text, const std::map<std::string, double>& values);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

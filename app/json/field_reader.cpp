@@ -11,7 +11,7 @@
 #include "core/expression/did_you_mean.hpp"
 #include "core/expression/dimension_inference.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -416,4 +416,4 @@ void FieldReader::refuse(std::string_view key, const std::string& message) {
   findings_.add(*node, inside(key), message);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -13,7 +13,7 @@
 #include "app/json/node.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class FieldReader {
  public:
@@ -194,4 +194,4 @@ void FieldReader::choice(std::string_view key, T& value, const Choice<T> (&choic
   findings_.add(*node, inside(key), not_among(key, given, available));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

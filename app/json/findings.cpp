@@ -4,7 +4,7 @@
 #include <limits>
 #include <set>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // Tries the path and all paths around it, from within, until `is_it` returns true. Returns whether it did.
@@ -72,4 +72,4 @@ void Findings::throw_if_any() const {
   throw InputError(std::move(all));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

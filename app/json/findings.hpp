@@ -10,7 +10,7 @@
 #include "app/json/node.hpp"
 #include "app/json/source_text.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class Findings {
  public:
@@ -48,4 +48,4 @@ class Findings {
   std::unordered_set<std::string> marked_, around_;  // paths with findings, and these with all paths they lie in
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -37,4 +37,4 @@ std::string to_string(const Finding& finding) {
 
 InputError::InputError(std::vector<Finding> all) : std::runtime_error(lines(all)), findings_(std::move(all)) {}
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

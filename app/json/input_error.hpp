@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct Finding {
   std::string source;        // the file as the user named it; empty: from a --set
@@ -28,4 +28,4 @@ class InputError : public std::runtime_error {
   std::vector<Finding> findings_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

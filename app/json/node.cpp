@@ -6,7 +6,7 @@
 
 #include "core/expression/expression.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 const Node* Node::find(std::string_view key) const {
   for (std::size_t i = 0; i < keys.size(); ++i)
@@ -94,4 +94,4 @@ const Node& nearest(const Node& root, std::string_view path) {
   return *node;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

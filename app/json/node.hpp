@@ -8,7 +8,7 @@
 
 #include "core/scene/scene_path.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // A JSON path (core/scene/scene_path.hpp), step by step.
 struct PathStep {
@@ -42,4 +42,4 @@ std::vector<PathStep> parse_path(std::string_view path);
 // The value at a path, or the nearest one around it that exists.
 const Node& nearest(const Node& root, std::string_view path);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -5,7 +5,7 @@
 #include "app/json/parse_json.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -80,4 +80,4 @@ void apply_override(Node& root, const std::string& override_text, int number, Fi
   *node = parse_override_value(override_text.substr(equals + 1), number);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

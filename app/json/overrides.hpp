@@ -6,9 +6,9 @@
 #include "app/json/findings.hpp"
 #include "app/json/node.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // override_text is "parameters.k1.value=120". number counts the --set options from 1.
 void apply_override(Node& root, const std::string& override_text, int number, Findings& findings);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <unordered_set>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -208,4 +208,4 @@ Node parse_override_value(const std::string& text, int source) {
   return node;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -9,7 +9,7 @@
 
 #include "optim/problem/plugin.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 std::string last_error() {
@@ -50,4 +50,4 @@ void load_plugin(const std::filesystem::path& file, NamedTerms& terms) {
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -9,7 +9,7 @@
 #include "app/json/parse_json.hpp"
 #include "app/json/source_text.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // "drives[0].law" of "drives[0].law: its samples"; empty if there is no path.
@@ -56,4 +56,4 @@ std::shared_ptr<ProblemSource> read_problem_source(const std::filesystem::path& 
   return std::make_shared<ProblemSource>(problem_source_of(read_text_file(file), file, set_overrides));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

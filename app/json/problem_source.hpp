@@ -17,7 +17,7 @@
 #include "app/json/read_options.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct ProblemSource {
   std::filesystem::path file;
@@ -39,4 +39,4 @@ ProblemSource problem_source_of(const std::string& text, const std::filesystem::
 Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings = nullptr,
                      const ReadOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -3,11 +3,11 @@
 
 #include "optim/problem/named_terms.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct ReadOptions {
   NamedTerms terms = {};       // in C++, which the file may call by name
   bool allow_plugins = false;  // whether the shared libraries that it names are loaded, which run code of their own
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -18,7 +18,7 @@
 #include "optim/problem/logged_columns.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -200,4 +200,4 @@ Problem read_problem(const std::filesystem::path& file, const std::vector<std::s
   return read_problem_text(read_text_file(file), file, set_overrides, warnings, options);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

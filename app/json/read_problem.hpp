@@ -15,7 +15,7 @@
 #include "app/json/read_options.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // Throws InputError with all faults. Each of set_overrides is "path=value". `warnings` receives remarks that are no
 // errors.
@@ -27,4 +27,4 @@ Problem read_problem_text(const std::string& text, const std::filesystem::path& 
                           const std::vector<std::string>& set_overrides = {},
                           std::vector<std::string>* warnings = nullptr, const ReadOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -8,7 +8,7 @@
 #include "core/scene/default_integrator.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -313,4 +313,4 @@ std::string problem_schema_text() {
   return schema.dump(2) + "\n";
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -5,8 +5,8 @@
 
 #include <string>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string problem_schema_text();
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

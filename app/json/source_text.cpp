@@ -6,7 +6,7 @@
 #include "app/json/input_error.hpp"
 #include "optim/problem/regular_file.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -111,4 +111,4 @@ std::string read_text_file(const std::filesystem::path& file) {
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

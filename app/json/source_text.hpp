@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct Position {
   int line = 1, column = 1;  // columns in characters (code points)
@@ -35,4 +35,4 @@ class SourceText {
 // Returns the whole file. Throws InputError with the given name if it cannot be read.
 std::string read_text_file(const std::filesystem::path& file);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -12,7 +12,7 @@
 #include "core/force/named_throw.hpp"
 #include "core/scene/scene_path.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 class TermResolver {
@@ -130,4 +130,4 @@ void resolve_terms(Problem& problem, const ReadOptions& options, const std::file
     laws(problem.identification->experiments[e].drives, child_path("identification.experiments", e));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

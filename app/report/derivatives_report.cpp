@@ -15,7 +15,7 @@
 #include "app/results/objective_units.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // p dpsi/dp, the change of psi per relative change of p, largest first. A p of zero would hide the derivative.
@@ -217,4 +217,4 @@ std::string check_report(const Scene& scene, const Json& result) {
   return finished(page, result);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

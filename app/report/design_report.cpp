@@ -13,7 +13,7 @@
 #include "app/results/objective_units.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // "track fell from 12.3 to 0.45 m^2 s (-96 %) in 12 iterations; no limit is missed; k is at a bound."
@@ -165,4 +165,4 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
   return finished(page, result);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

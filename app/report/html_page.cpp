@@ -10,7 +10,7 @@
 #include "app/report/line_plot.hpp"
 #include "app/report/report_assets.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // A cell of so many characters is a sentence, which wraps. The longest other cell, an interval of two numbers, has 30:
@@ -120,4 +120,4 @@ std::string HtmlPage::text() const {
       fmt::join(motions_, ",\n"), kReportScript, compared_);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -14,7 +14,7 @@
 
 #include "app/report/html_text.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct LinePlot;
 
@@ -73,4 +73,4 @@ class HtmlPage {
   PageArrays arrays_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -10,7 +10,7 @@
 
 #include "app/files/json_text.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string html_escaped(std::string_view text) {
   std::string escaped;
@@ -56,4 +56,4 @@ std::size_t PageArrays::add(const std::vector<double>& values, int digits) {
 
 std::string PageArrays::text() const { return fmt::format("[{}]", fmt::join(texts_, ",\n")); }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

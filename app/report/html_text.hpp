@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string html_escaped(std::string_view text);
 std::string html_words(std::string_view text);   // escaped; no line ends within "1e-9" or "--out"
@@ -38,4 +38,4 @@ class PageArrays {
   std::vector<std::string> texts_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -13,7 +13,7 @@
 #include "app/report/run_report.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 std::string interval_of(const Json& parameter) {
@@ -351,4 +351,4 @@ std::string identification_report(const Scene& scene, const Json& result, const 
   return page.text();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -13,7 +13,7 @@
 
 #include "app/report/html_text.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr double kPlotWidth = 760, kPlotHeight = 320;               // of the drawing [px]
@@ -420,4 +420,4 @@ std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
                      json_list(plot.instants, instant_json), json_list(plot.x_names, json_quoted));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 enum class Mark { line, dashed, points, rings, bars, crosses };  // bars: from zero to y
 
@@ -68,4 +68,4 @@ std::vector<double> round_ticks(double low, double high, int count);
 // takes 1, 2, 5 times powers of ten; if there are none, round numbers.
 std::vector<double> logarithmic_ticks(double low, double high, int count);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

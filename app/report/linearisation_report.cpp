@@ -10,7 +10,7 @@
 #include "app/results/objective_units.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 namespace {
 
@@ -111,4 +111,4 @@ std::string linearisation_report(const Scene& scene, const Json& result, const L
   return finished(page, result);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

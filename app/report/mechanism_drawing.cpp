@@ -11,7 +11,7 @@
 #include "app/report/line_plot.hpp"
 #include "app/report/mechanism_sketch.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Point3 = Eigen::Vector3d;
@@ -251,4 +251,4 @@ Scene with_values(Scene scene, const Eigen::VectorXd& rho) {
   return scene;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

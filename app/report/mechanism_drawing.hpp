@@ -12,7 +12,7 @@
 
 #include "app/results/trajectory_csv.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct DrawnState {
   std::string name;
@@ -30,4 +30,4 @@ std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane
 // A scene with other values of its parameters.
 Scene with_values(Scene scene, const Eigen::VectorXd& rho);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

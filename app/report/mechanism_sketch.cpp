@@ -7,7 +7,7 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/scene/scene_facts.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Eigen::Vector3d;
@@ -110,4 +110,4 @@ Vector3d placed(const std::vector<double>& row, const SketchPoint& p) {
   return Vector3d(b[0], b[1], b[2]) + A(e) * p.s;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

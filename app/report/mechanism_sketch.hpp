@@ -9,7 +9,7 @@
 
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 inline constexpr std::size_t kGround = static_cast<std::size_t>(-1);
 
@@ -61,4 +61,4 @@ SketchPoint point_of(const Scene& scene, const std::string& body, const PointFie
 // Global position of a point, from a trajectory's row: t, then 13 numbers per body.
 Eigen::Vector3d placed(const std::vector<double>& row, const SketchPoint& p);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

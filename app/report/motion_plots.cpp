@@ -7,7 +7,7 @@
 
 #include "app/results/objective_units.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::size_t kMostSeries = 6;  // in one plot
@@ -91,4 +91,4 @@ std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before,
   return plots;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -9,7 +9,7 @@
 #include "app/report/line_plot.hpp"
 #include "app/results/trajectory_csv.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::vector<double> column(const Trajectory& table, std::size_t index);
 // A column over the first one; nothing without that column or without rows.
@@ -22,4 +22,4 @@ using SensorLimits = std::vector<std::pair<std::string, PlotLimit>>;
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after,
                                    const SensorLimits& limits = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -11,7 +11,7 @@
 #include "app/report/motion_plots.hpp"
 #include "core/scene/scene_facts.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::size_t kMostNumbers = 20'000;  // of all poses: some 200 kB of the page
@@ -171,4 +171,4 @@ std::string motion_scene(PageArrays& arrays, std::array<int, 2> plane, const std
                      fmt::join(parts, ",\n"));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -14,7 +14,7 @@
 #include "app/results/trajectory_csv.hpp"
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct MovingState {
   std::string name;
@@ -29,4 +29,4 @@ struct MovingState {
 // than two rows or a number in it is not finite.
 std::string motion_scene(PageArrays& arrays, std::array<int, 2> plane, const std::vector<MovingState>& states);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

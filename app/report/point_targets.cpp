@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::size_t kMostTimes = 200;  // crosses that a reader still tells apart
@@ -67,4 +67,4 @@ std::vector<PointTarget> prescribed_points(const Problem& problem, const std::ve
   return point_targets(problem.scene, values, false);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

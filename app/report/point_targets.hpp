@@ -11,7 +11,7 @@
 #include "app/report/mechanism_sketch.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // One point over time. Global coordinates [m] that are neither prescribed nor measured are empty.
 struct PointTarget {
@@ -36,4 +36,4 @@ std::vector<PointTarget> point_targets(const Scene& scene, const std::vector<Sen
 std::vector<PointTarget> prescribed_points(const Problem& problem,
                                            const std::vector<std::vector<double>>& instants = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -3,8 +3,8 @@
 
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 extern const std::string_view kReportStyle, kReportScript;
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

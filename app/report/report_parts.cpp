@@ -15,7 +15,7 @@
 #include "core/expression/counted.hpp"
 #include "core/expression/dimension.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::size_t kMostCurves = 16;  // in one plot: each colour twice
@@ -319,4 +319,4 @@ std::string finished(HtmlPage& page, const Json& result) {
   return page.text();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

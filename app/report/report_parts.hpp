@@ -12,7 +12,7 @@
 #include "app/report/motion_scene.hpp"
 #include "app/results/trajectory_csv.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // "m^2 s"; kUnknownUnit if the unit of an objective, an entry of result["objectives"], is unknown.
 std::string unit_of(const Json& objective);
@@ -61,4 +61,4 @@ double number_of(const Json& object, const std::string& key);  // NaN if it is n
 // A number, a word, an interval, or "-" for none.
 std::string cell(const Json& value, int digits = 7);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -8,7 +8,7 @@
 #include "app/report/html_text.hpp"
 #include "app/report/line_plot.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // Positions in the drawing [px]. On a narrow page names and numbers share a line above their bar.
@@ -92,4 +92,4 @@ std::string to_svg(const RowPlot& plot) {
   return figure + "</figure>\n";
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct PlotRow {
   std::string name;
@@ -33,4 +33,4 @@ struct RowPlot {
 // Returns an empty string without rows.
 std::string to_svg(const RowPlot& plot);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -13,7 +13,7 @@
 #include "app/report/report_parts.hpp"
 #include "optim/problem/regular_file.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -112,4 +112,4 @@ void write_run_index(const fs::path& folder) {
   if (const std::string text = run_index(folder); !text.empty()) write_file_atomically(file, text);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

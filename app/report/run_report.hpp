@@ -12,12 +12,12 @@
 #include "app/results/objective_units.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "core/start/linearisation.hpp"
+#include "optim/tradeoff/penalty_study.hpp"
+#include "optim/tradeoff/tradeoff_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct SweepPoints;
-struct Tradeoff;
-struct PenaltyStudy;
 
 // The parts of a motion in a report beside its trajectory; each may be empty.
 struct MotionParts {
@@ -77,4 +77,4 @@ std::string sweep_report(const Problem& problem, const SweepPoints& points, cons
 std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff, const ObjectiveUnits& units);
 std::string penalty_report(const Json& result, const PenaltyStudy& study);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -9,7 +9,7 @@
 #include "app/results/objective_units.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // "5 s of motion in 312 steps; constraints hold within 2.1e-11; track = 1.234."
@@ -82,4 +82,4 @@ std::string simulation_report(const Scene& scene, const Json& result, const Traj
   return finished(page, result);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

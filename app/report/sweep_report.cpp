@@ -13,7 +13,7 @@
 #include "app/run/sweep_points.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Point = std::vector<double>;  // a row of the table
@@ -186,4 +186,4 @@ std::string sweep_report(const Problem& problem, const SweepPoints& points, cons
   return finished(page, result);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

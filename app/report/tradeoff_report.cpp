@@ -18,7 +18,7 @@
 #include "optim/tradeoff/tradeoff.hpp"
 #include "optim/tradeoff/tradeoff_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 void add_reference(HtmlPage& page, const Json& result, const TradeoffReference& reference) {
@@ -265,4 +265,4 @@ std::string penalty_report(const Json& result, const PenaltyStudy& study) {
   return finished(page, result);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -6,7 +6,7 @@
 #include "core/expression/counted.hpp"
 #include "core/watch/stiffness.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // "engineering (1e-05): dopri5 at rtol 1e-06, atol 1e-08; ..."
@@ -105,4 +105,4 @@ void warn_of_stiffness(Run& run, const SimulationStatistics& statistics, bool di
   if (!warning.empty()) run.warn(warning);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

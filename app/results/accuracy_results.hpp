@@ -5,7 +5,7 @@
 #include "app/run/run.hpp"
 #include "optim/tradeoff/accuracy.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // Replaces the accuracy of the run's problem by settings. It does nothing if the file requests no accuracy. It takes
 // the program's defaults, with a warning, if it finds none. Call it between start() and the first simulation. Returns
@@ -17,4 +17,4 @@ bool settle_accuracy(Run& run, const Scene& simulated, const std::vector<Objecti
 // Warns if stability limits the steps of an explicit method.
 void warn_of_stiffness(Run& run, const SimulationStatistics& statistics, bool differentiated);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

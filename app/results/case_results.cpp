@@ -13,7 +13,7 @@
 #include "optim/problem/load_cases.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 int case_threads(const Run& run) {
   const int asked = run.context.options.threads;
@@ -78,4 +78,4 @@ bool check_cases(Run& run) {
   return all_agree;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

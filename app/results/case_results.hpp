@@ -4,7 +4,7 @@
 #include "app/run/run.hpp"
 #include "optim/objective/evaluator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // Takes the values of the file; does nothing without cases. If a case fails, so does the run.
 void add_cases(Run& run, bool gradients, GradientMethod method = GradientMethod::automatic);
@@ -15,4 +15,4 @@ bool check_cases(Run& run);
 // The number of threads for load cases.
 int case_threads(const Run& run);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -15,7 +15,7 @@
 #include "optim/problem/logged_columns.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // A channel of all windows of its experiment, in the order of time.
@@ -135,4 +135,4 @@ void add_windows(Run& run, const Problem& cut) {
                                    windows["start_time"].get<double>(), windows["end_time"].get<double>());
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

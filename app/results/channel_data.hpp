@@ -13,7 +13,7 @@
 #include "optim/fit/identification.hpp"
 #include "optim/problem/csv_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct ChannelData {
   std::string experiment, column, unit;
@@ -36,4 +36,4 @@ std::string unit_of_channel(const Scene& scene, const ChannelSpec& channel, cons
 // Adds the windows of experiments to the result, "windows", and prints them. cut: cut_into_windows.
 void add_windows(Run& run, const Problem& cut);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

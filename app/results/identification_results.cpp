@@ -11,7 +11,7 @@
 #include "core/expression/counted.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr Eigen::Index kWholeMatrix = 10;  // parameters, up to which the correlation is printed whole
@@ -351,4 +351,4 @@ std::string profile_csv(const IdentificationResult& fit) {
   return text;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -9,7 +9,7 @@
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // The report before the fit: what the data would determine at the start with the given sigmas.
 void print_preflight(std::ostream& out, const IdentificationResult& start);
@@ -28,4 +28,4 @@ Trajectory history_of(const IdentificationResult& fit);      // history.csv
 std::string residuals_csv(const IdentificationResult& fit);  // a row per sample
 std::string profile_csv(const IdentificationResult& fit);    // a row per point of a profile
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -5,7 +5,7 @@
 #include "core/dynamics/motion_solver.hpp"
 #include "core/scene/type_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::size_t kMostInstants = 300;  // arrows that move smoothly
@@ -57,4 +57,4 @@ void JointForces::observe(std::size_t i, const StatePoint& at) {
   table_.rows.push_back(std::move(row));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

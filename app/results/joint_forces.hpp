@@ -10,10 +10,9 @@
 #include <memory>
 
 #include "app/results/trajectory_csv.hpp"
+#include "core/dynamics/motion_solver.hpp"
 
-namespace mbsopt {
-
-class MotionSolver;
+namespace mbsopt::inline app {
 
 class JointForces {
  public:
@@ -33,4 +32,4 @@ class JointForces {
   Trajectory table_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

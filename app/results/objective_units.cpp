@@ -10,7 +10,7 @@
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/type_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Known = std::optional<Dimension>;  // nullopt: not known
@@ -153,4 +153,4 @@ std::string unit_in(const Scene& scene, const Sensor& sensor) {
   return unit_of(scene, sensor);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

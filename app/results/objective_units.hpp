@@ -12,7 +12,7 @@
 #include "app/files/result_json.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 inline constexpr const char* kUnknownUnit = "SI unit";  // is shown where a unit is not known
 
@@ -54,4 +54,4 @@ Json by_name(const std::vector<std::string>& names, const auto& values) {
 // Adds "unit" to each objective of a result and of its load cases whose unit is known.
 void add_units(Json& result, const ObjectiveUnits& units);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -12,7 +12,7 @@
 #include "core/scene/scene_path.hpp"
 #include "core/scene/vocabulary.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 Json json_of(const Field& field) { return field.is_number() ? Json(field.number()) : Json(field.text()); }
@@ -138,4 +138,4 @@ std::string recommended_problem_text(const Run& run, const SimulationSettings& s
   return text;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

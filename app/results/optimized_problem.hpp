@@ -7,7 +7,7 @@
 
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct NewValue {
   std::string experiment;  // empty: of the parameter itself; else the value it takes in that experiment
@@ -25,4 +25,4 @@ std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& 
 // stay, except inside simulation.integrator and .formulation.
 std::string recommended_problem_text(const Run& run, const SimulationSettings& settings);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -4,7 +4,7 @@
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 void print_penalty(Run& run, const PenaltyStudy& study) {
@@ -87,4 +87,4 @@ void add_penalty_study(Run& run, const PenaltyStudy& study) {
   run.result["penalty"] = penalty_json(study);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -21,7 +21,7 @@
 #include "optim/objective/integration_error.hpp"
 #include "optim/objective/objective_run.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 std::vector<std::vector<double>> instants_of(const std::vector<Objective>& objectives, const Mechanism& mechanism,
@@ -205,4 +205,4 @@ void write_sensitivities(Run& run) {
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

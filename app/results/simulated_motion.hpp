@@ -5,7 +5,7 @@
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/run.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct SimulatedMotion {
   SimulationResult simulation;
@@ -34,4 +34,4 @@ void require_sensitivities(const Scene& scene);
 // A failed or stopped run leaves no file; the outcome of `run` gives the reason.
 void write_sensitivities(Run& run);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -10,7 +10,7 @@
 #include "app/results/trajectory_csv.hpp"
 #include "core/scene/vocabulary.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // Sets names and values of columns together, so that they correspond.
@@ -120,4 +120,4 @@ std::string to_csv(const PenaltyStudy& study) {
   return Row::table(rows);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

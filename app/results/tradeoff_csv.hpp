@@ -6,9 +6,9 @@
 #include "optim/tradeoff/penalty_study.hpp"
 #include "optim/tradeoff/tradeoff.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string to_csv(const Tradeoff& tradeoff);
 std::string to_csv(const PenaltyStudy& study);  // a row per alpha
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

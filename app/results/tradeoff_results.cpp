@@ -9,7 +9,7 @@
 #include "core/expression/counted.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr double kAdvisedAccuracies[] = {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
@@ -259,4 +259,4 @@ void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& advic
   run.context.out << "\napplied " << words << '\n';
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

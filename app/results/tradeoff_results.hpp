@@ -7,7 +7,7 @@
 #include "optim/tradeoff/advice.hpp"
 #include "optim/tradeoff/penalty_study.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string duration_text(double seconds);  // "12.3 ms", "1.5 s"
 // "1.2e-04", "-" of an error that is not there; "< 4.3e-06" below what the reference is certain of.
@@ -30,4 +30,4 @@ void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& advic
 
 void add_penalty_study(Run& run, const PenaltyStudy& study);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -7,7 +7,7 @@
 
 #include "core/run/output_times.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::vector<std::string> trajectory_columns(const Scene& scene) {
   std::vector<std::string> columns{"t"};
@@ -70,4 +70,4 @@ std::string csv_cell(std::string_view text) {
   return quoted + '"';
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -13,7 +13,7 @@
 #include "core/scene/scene.hpp"
 #include "core/simulate/simulation.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct Trajectory {
   std::vector<std::string> columns;       // as in the file's header
@@ -39,4 +39,4 @@ std::optional<std::string> to_csv(const Trajectory& trajectory, const std::funct
 // a text that a spreadsheet would run as a formula (OWASP, "CSV injection").
 std::string csv_cell(std::string_view text);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

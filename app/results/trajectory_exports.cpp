@@ -10,7 +10,7 @@
 
 #include "app/results/objective_units.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // Types of data elements, and the class of a matrix of doubles.
@@ -120,4 +120,4 @@ std::string gnuplot_script(const Scene& scene) {
   return script + "unset multiplot\n";
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

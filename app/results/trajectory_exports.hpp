@@ -6,7 +6,7 @@
 
 #include "app/results/trajectory_csv.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // The unique names of the vectors: letters, digits and _, at most 63, beginning with a letter.
 std::vector<std::string> mat_names(const std::vector<std::string>& columns);
@@ -21,4 +21,4 @@ std::string to_mat(const Trajectory& trajectory);
 // trajectory.gp: a gnuplot script that plots each sensor of trajectory.csv, and the position of each body.
 std::string gnuplot_script(const Scene& scene);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -12,7 +12,7 @@
 #include "app/run/sweep_points.hpp"
 #include "optim/problem/named_terms.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct ProblemSource;
 struct Ranks;
@@ -67,4 +67,4 @@ CommandFunction resume_command;  // options.problem_file: the folder
 CommandFunction import_command;  // options.problem_file: the model
 CommandFunction new_command, schema_command, completion_command;
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

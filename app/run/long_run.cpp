@@ -11,7 +11,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "optim/problem/seed.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 Json header_of(const Run& run, const Json& seeds) {
@@ -124,4 +124,4 @@ int LongRun::finish() {
   return exit_code;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

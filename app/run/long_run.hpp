@@ -16,7 +16,7 @@
 #include "app/run/run.hpp"
 #include "optim/solver/solver_outcome.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class LongRun {
  public:
@@ -52,4 +52,4 @@ class LongRun {
   bool finished_ = false;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

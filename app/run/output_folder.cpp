@@ -12,7 +12,7 @@
 #include "app/files/json_text.hpp"
 #include "optim/problem/regular_file.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -123,4 +123,4 @@ void OutputFolder::mark_failed() const noexcept {
   ::close(descriptor);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -14,7 +14,7 @@
 
 #include "app/files/folder_lock.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class OutputFolder {
  public:
@@ -37,4 +37,4 @@ class OutputFolder {
   std::string owner_, command_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -19,7 +19,7 @@
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/regular_file.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // Quotes a word if a shell needs it, so that the line can be pasted.
@@ -104,4 +104,4 @@ std::string machine_name(const Json& machine) {
   return fmt::format("{}, {}", machine.at("cpu").get<std::string>(), counted(machine.at("cores").get<int>(), "core"));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

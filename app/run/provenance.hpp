@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 std::string program_version();
 std::string sha256_of_file(const std::string& path);  // lower-case hex; empty where it cannot be read
@@ -22,4 +22,4 @@ nlohmann::ordered_json machine_json();
 // "Intel(R) Core(TM) i7-8700, 12 cores"
 std::string machine_name(const nlohmann::ordered_json& machine);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

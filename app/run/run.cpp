@@ -18,7 +18,7 @@
 #include "core/start/model_warnings.hpp"
 #include "core/watch/start_failure.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 struct StatusRow {
@@ -277,4 +277,4 @@ void add_derivative_counts(Run& run, const Scene& simulated, const SimulationSta
   json["differentiated_numbers"] = mechanism.data().slots();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -26,7 +26,7 @@
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 enum class RunStatus { running, ok, failed, disagrees, interrupted };
 
@@ -109,4 +109,4 @@ void say_left_out(Run& run, const std::vector<std::string>& bodies, const char* 
 // (core/mechanism/derivative_blocks.hpp), and numbers of the model that parameters change.
 void add_derivative_counts(Run& run, const Scene& simulated, const SimulationStatistics& statistics);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -11,7 +11,7 @@
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/start_points.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::size_t kMostPoints = 10'000'000;  // of a grid: more is an input error, and fills the memory
@@ -149,4 +149,4 @@ SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long s
   return points;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

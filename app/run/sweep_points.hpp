@@ -8,7 +8,7 @@
 
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct SweepOptions {
   std::vector<std::string> vary;    // "k1=10:20:5" of a grid, "k1=10:20" of samples
@@ -27,4 +27,4 @@ struct SweepPoints {
 // Throws std::invalid_argument or CsvError in words.
 SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long seed);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -18,7 +18,7 @@
 #include "optim/problem/start_points.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 std::string progress_line(const DesignRow& row) {
@@ -243,4 +243,4 @@ DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& befo
   return outcome;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

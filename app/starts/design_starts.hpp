@@ -5,7 +5,7 @@
 #include "app/starts/start_workers.hpp"
 #include "optim/design/design.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // The JSON members "mode" and "of".
 Json mode_json(const DesignMode& mode);
@@ -21,4 +21,4 @@ DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& befo
 // The starts of its multistart, from the task of this process or another one.
 StartWork design_start_work(Problem problem, const Json& task);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -10,7 +10,7 @@
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/variable_scaling.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr double kSameOptimum = 1e-3;  // of the range of a parameter, in its scale
@@ -132,4 +132,4 @@ bool all_found(const std::vector<Json>& ranked, const Scene& scene) {
   });
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

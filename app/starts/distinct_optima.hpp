@@ -16,7 +16,7 @@
 #include "app/files/result_json.hpp"
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: what ranks as feasible
 
@@ -51,4 +51,4 @@ SearchedOptima searched(const std::vector<DistinctOptimum>& optima);
 // Returns whether the rule holds in each searched assembly mode.
 bool all_found(const std::vector<Json>& ranked, const Scene& scene);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

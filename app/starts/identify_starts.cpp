@@ -13,7 +13,7 @@
 #include "optim/problem/logged_columns.hpp"
 #include "optim/problem/start_points.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // The objective that ranks starts. With estimated sigmas, each start ends at a cost of half its degrees of freedom,
@@ -120,4 +120,4 @@ void describe_given(const Problem& given, IdentificationResult& fit) {
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

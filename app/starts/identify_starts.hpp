@@ -8,7 +8,7 @@
 #include "optim/fit/identification.hpp"
 #include "optim/problem/csv_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct BestStart {
   Problem problem;
@@ -32,4 +32,4 @@ int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best);
 // Sets "initial" of each parameter to its given value, not to that of the best start.
 void describe_given(const Problem& given, IdentificationResult& fit);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -6,7 +6,7 @@
 
 #include "app/files/journal.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Eigen::Index;
@@ -139,4 +139,4 @@ void JsonResidualRecords::record(const Asked& asked, const Experiment::Residuals
   tell_(content);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

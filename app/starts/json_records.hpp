@@ -11,7 +11,7 @@
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/solver/nonlinear_program.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class JsonPointRecords : public PointRecords {
  public:
@@ -52,4 +52,4 @@ class JsonResidualRecords : public ResidualRecords {
   Tell tell_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

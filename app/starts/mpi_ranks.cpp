@@ -13,7 +13,7 @@
 #endif
 #endif
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 bool started_by_mpirun() {
@@ -117,4 +117,4 @@ std::unique_ptr<Ranks> mpi_ranks() {
 }
 #endif
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

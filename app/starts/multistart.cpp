@@ -14,7 +14,7 @@
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr std::size_t kPrinted = 20;
@@ -213,4 +213,4 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
   return outcome;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -17,7 +17,7 @@
 #include "app/starts/start_workers.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct MultistartOutcome {
   std::vector<Json> ranked;  // best first; what failed last
@@ -39,4 +39,4 @@ std::vector<Parameter> parameters_of(const Scene& scene, const std::vector<std::
 // The problem with other values of some parameters, without the multistart.
 Problem with_values(Problem problem, const Json& values);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -10,7 +10,7 @@
 #include "app/terminal/text_table.hpp"
 #include "optim/fit/variant_comparison.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr double kSmall = 0.01;  // p
@@ -98,4 +98,4 @@ void OtherModel::compare(Run& run, const IdentificationResult& fit, const Identi
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -11,7 +11,7 @@
 #include "optim/fit/identification.hpp"
 #include "optim/fit/windows.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class OtherModel {
  public:
@@ -31,4 +31,4 @@ class OtherModel {
   CutProblem cut_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

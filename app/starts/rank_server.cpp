@@ -18,7 +18,7 @@
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 void set_integrator(Problem& problem, const Json& integrator) {
@@ -126,4 +126,4 @@ void dismiss(Ranks& ranks) {
   for (int rank = 1; rank < ranks.size(); ++rank) ranks.send(rank, json_text(Json{{"dismissed", true}}));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -4,10 +4,10 @@
 #include "app/starts/ranks.hpp"
 #include "optim/problem/named_terms.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // Serves until rank 0 dismisses all. terms are those of the program. Returns the exit code.
 int serve(Ranks& ranks, const NamedTerms& terms = {});
 void dismiss(Ranks& ranks);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // The interval between checks for messages. MPI itself would wait at full speed.
 inline constexpr int kPollMilliseconds = 5;
@@ -34,4 +34,4 @@ struct Ranks {
 // this build has no MPI, or finds no library.
 std::unique_ptr<Ranks> mpi_ranks();
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -11,7 +11,7 @@
 #include "app/results/case_results.hpp"
 #include "app/terminal/interrupt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -122,4 +122,4 @@ void compute_starts(Run& run, const std::vector<int>& starts, const StartWork& w
       });
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -14,7 +14,7 @@
 #include "app/starts/ranks.hpp"
 #include "optim/machine/process_pool.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct StartWork {
   Json task;  // all that `record` is made from, beside the problem
@@ -26,4 +26,4 @@ struct StartWork {
 void compute_starts(Run& run, const std::vector<int>& starts, const StartWork& work,
                     const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

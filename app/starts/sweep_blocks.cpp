@@ -11,7 +11,7 @@
 #include "optim/objective/evaluator.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 // A block costs a process (1 ms) and a line of the journal. A killed sweep loses one block per worker.
@@ -127,4 +127,4 @@ StartWork sweep_work(const Problem& problem, const Json& task) {
            gradients = options.gradients](int block) { return record_of_block(problem, points, gradients, block); }};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

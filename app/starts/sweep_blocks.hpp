@@ -14,7 +14,7 @@
 #include "app/run/sweep_points.hpp"
 #include "app/starts/start_workers.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 struct SweepRow {
   bool done = false;
@@ -30,4 +30,4 @@ std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& poin
 // The blocks, from the task of this process or another one.
 StartWork sweep_work(const Problem& problem, const Json& task);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

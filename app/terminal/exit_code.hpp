@@ -1,7 +1,7 @@
 // The exit codes of the program (docs/cli.md).
 #pragma once
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 enum ExitCode : int {
   kDone = 0,
@@ -11,4 +11,4 @@ enum ExitCode : int {
   kInterrupted = 130,  // 128 + SIGINT, as shells do
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

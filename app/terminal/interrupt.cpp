@@ -8,7 +8,7 @@
 #include <chrono>
 #include <cstddef>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 using Clock = std::chrono::steady_clock;  // clock_gettime, which a signal handler may call
@@ -84,4 +84,4 @@ bool interrupted() {
 
 void interrupt() { flag = true; }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -3,7 +3,7 @@
 // later one ends the program at once. A signal handler can access only static flags; these are the only ones.
 #pragma once
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 // While it lives, the first test of the flag installs its handlers. Before and afterwards these signals end the
 // program: a command that never tests must not prevent this. SIGHUP stays ignored if it was (nohup). SIGPIPE sets the
@@ -20,4 +20,4 @@ class InterruptGuard {
 bool interrupted();
 void interrupt();  // has the effect of a signal
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 constexpr int kBarWidth = 40;
@@ -122,4 +122,4 @@ void Progress::finish() {
   shown_percent_ = -1;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -15,7 +15,7 @@
 #include <string>
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class Progress {
  public:
@@ -53,4 +53,4 @@ class Progress {
   double began_ = 0, done_ = 0;  // when it was first told [s], and how much was done then
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -3,11 +3,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 void open_missing_standard_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
     if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", O_RDWR);  // takes the lowest free number: this one
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 namespace {
 
 bool looks_like_a_number(const std::string& cell) {
@@ -71,4 +71,4 @@ std::string or_blank(const std::optional<double>& value, int digits) {
   return value ? significant(*value, digits) : std::string();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

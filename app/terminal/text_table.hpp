@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline app {
 
 class TextTable {
  public:
@@ -27,4 +27,4 @@ class TextTable {
 std::string significant(double value, int digits = 7);  // "2.146954", "1.2e-05", "-"  where it is not a number
 std::string or_blank(const std::optional<double>& value, int digits = 7);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline app

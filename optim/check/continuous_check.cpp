@@ -11,7 +11,7 @@
 #include "optim/objective/integration_error.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -197,4 +197,4 @@ ContinuousCheck check_continuous(const Scene& scene, const std::vector<Objective
   return ContinuousComparison(scene, objectives, options).run();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

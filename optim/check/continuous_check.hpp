@@ -16,7 +16,7 @@
 #include "optim/check/gradient_timing.hpp"
 #include "optim/differences/verdict.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct ContinuousEntry {
   std::string objective, parameter;
@@ -55,4 +55,4 @@ struct ContinuousCheckOptions {
 ContinuousCheck check_continuous(const Scene& scene, const std::vector<Objective>& objectives,
                                  const ContinuousCheckOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

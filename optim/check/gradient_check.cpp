@@ -16,7 +16,7 @@
 #include "optim/check/user_terms.hpp"
 #include "optim/machine/stopwatch.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -455,4 +455,4 @@ GradientCheck check_gradients(const Scene& scene, const std::vector<Objective>& 
   return Check(scene, objectives, options).run();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

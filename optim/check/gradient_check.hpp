@@ -34,7 +34,7 @@
 #include "optim/objective/evaluator.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The limits of the differences between methods. docs/gradient-check.md gives the reasons for these figures.
 struct CheckThresholds {
@@ -109,4 +109,4 @@ GradientCheck check_gradients(const Problem& problem, const GradientCheckOptions
 GradientCheck check_gradients(const Scene& scene, const std::vector<Objective>& objectives,
                               const GradientCheckOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -6,7 +6,7 @@
 
 #include "optim/differences/verdict.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -153,4 +153,4 @@ double GradientDifferences::kink(Index i, Index k, bool frozen, double psi_round
   return b / wider > kKinkFalls ? b : kNaN;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

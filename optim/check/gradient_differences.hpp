@@ -19,7 +19,7 @@
 #include "optim/objective/evaluator.hpp"
 #include "optim/objective/integration_error.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // psi carries the rounding of all steps: some units in the last place of the largest numbers in it.
 inline constexpr double kPsiRounding = 100 * std::numeric_limits<double>::epsilon();
@@ -102,4 +102,4 @@ class GradientDifferences {
   Eigen::MatrixXd jump_;  // of psi, between the steps of the base run and free steps
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -4,7 +4,7 @@
 #include "optim/machine/stopwatch.hpp"
 #include "optim/objective/evaluator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Seconds of one method, and their ratios to the simulations of the same rounds.
@@ -54,4 +54,4 @@ GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& 
   return timing;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

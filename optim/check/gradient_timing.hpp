@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
+#include "core/force/user_force.hpp"
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class Objective;
-struct UserForce;
 
 struct MethodCost {
   double wall_seconds = 0;  // median of the rounds
@@ -45,4 +45,4 @@ struct GradientTiming {
 GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& objectives,
                               const GradientTimingOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

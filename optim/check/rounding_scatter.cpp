@@ -6,7 +6,7 @@
 #include <optional>
 #include <random>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::VectorXd;
@@ -70,4 +70,4 @@ RoundingScatter rounding_scatter(const RoundingBase& base, const RoundingRuns& r
   return scatter;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

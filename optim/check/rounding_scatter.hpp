@@ -12,7 +12,7 @@
 #include "core/scene/scene.hpp"
 #include "optim/objective/evaluator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct RoundingScatter {
   Eigen::VectorXd psi;
@@ -35,4 +35,4 @@ struct RoundingRuns {
 
 RoundingScatter rounding_scatter(const RoundingBase& base, const RoundingRuns& runs);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

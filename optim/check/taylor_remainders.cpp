@@ -6,7 +6,7 @@
 
 #include "optim/machine/median.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 struct TaylorRung {
@@ -69,4 +69,4 @@ std::vector<TaylorCheck> check_taylor_remainders(const std::vector<std::string>&
   return checks;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // A remainder is clear of rounding if it exceeds it so many times.
 inline constexpr double kTaylorClear = 100;
@@ -36,4 +36,4 @@ struct TaylorLine {
 std::vector<TaylorCheck> check_taylor_remainders(const std::vector<std::string>& objectives, const Eigen::VectorXd& psi,
                                                  const TaylorLine& line, double least_slope);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -18,7 +18,7 @@
 #include "optim/objective/sampled_motion.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -308,4 +308,4 @@ std::vector<std::string> wrong_user_terms(const Scene& scene, const std::vector<
   return UserTerms(scene, objectives, user_forces).find(progress);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -16,13 +16,11 @@
 #include "core/scene/scene.hpp"
 #include "optim/objective/objective.hpp"
 
-namespace mbsopt {
-
-struct UserForce;
+namespace mbsopt::inline optim {
 
 // Returns one sentence for each wrong derivative, with its force, drive or objective.
 std::vector<std::string> wrong_user_terms(const Scene& scene, const std::vector<Objective>& objectives,
                                           const std::vector<std::shared_ptr<const UserForce>>& user_forces,
                                           const std::function<bool(double t)>& progress = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -11,7 +11,7 @@
 #include "core/start/nearest_approach.hpp"
 #include "optim/solver/bounded_linear_least_squares.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -121,4 +121,4 @@ ClosedStart close_start(const CaseEvaluator& evaluator, const VariableScaling& s
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

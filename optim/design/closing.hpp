@@ -19,7 +19,7 @@
 #include "optim/objective/case_evaluator.hpp"
 #include "optim/problem/variable_scaling.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct ClosedStart {
   Eigen::VectorXd x;    // scaled variables
@@ -32,4 +32,4 @@ struct ClosedStart {
 ClosedStart close_start(const CaseEvaluator& evaluator, const VariableScaling& scaling, const Eigen::VectorXd& x_start,
                         const std::function<bool()>& go_on = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

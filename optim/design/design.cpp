@@ -12,7 +12,7 @@
 #include "optim/design/single_design.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // The problem with a start at which its linkage closes, where it does not at the given one and such a start is found.
@@ -77,4 +77,4 @@ DesignResult run_design(const Problem& given, const DesignOptions& options) {
   return result;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

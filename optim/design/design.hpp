@@ -16,7 +16,7 @@
 #include "optim/design/design_result.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // problem.design must be there. Throws std::invalid_argument where it makes no sense (unknown names, no bounds to
 // hold).
@@ -37,4 +37,4 @@ int design_modes(const Problem& problem, const DesignOptions& options = {});
 // The scale that a run from the problem's own values would take.
 NlpScale design_scale(const Problem& problem, const DesignOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -11,7 +11,7 @@
 #include "optim/design/true_limits.hpp"
 #include "optim/solver/optimality.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Times the tolerance of least squares. If the cost settles to 1e-10 of itself, optimality is known to the root of
@@ -241,4 +241,4 @@ void judge_solution(const DesignSpec& spec, const DesignProgram& program, const 
   judge_true_extremes(program, evaluator, result);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -8,7 +8,7 @@
 #include "optim/problem/problem.hpp"
 #include "optim/problem/variable_scaling.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Adds warnings of variables that move nothing, too.
 void describe_start(const Problem& problem, const CaseEvaluator& evaluator, const DesignProgram& program,
@@ -27,4 +27,4 @@ void describe_solution(DesignProgram& program, const VariableScaling& scaling, c
 void judge_solution(const DesignSpec& spec, const DesignProgram& program, const CaseEvaluator& evaluator,
                     DesignResult& result);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

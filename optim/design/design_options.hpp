@@ -8,7 +8,7 @@
 
 #include "optim/design/design_result.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct DesignOptions {
   GradientMethod method = GradientMethod::automatic;
@@ -25,4 +25,4 @@ struct DesignOptions {
   std::optional<int> mode = {};  // assembly mode at the start (DesignMode); none: that of the scene's poses
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

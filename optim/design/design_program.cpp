@@ -8,7 +8,7 @@
 #include "optim/objective/hessian.hpp"
 #include "optim/solver/evaluated_points.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -209,4 +209,4 @@ bool DesignProgram::hessians(const VectorXd& x, std::vector<MatrixXd>& H) {
   return true;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -17,7 +17,7 @@
 #include "optim/problem/variable_scaling.hpp"
 #include "optim/solver/nonlinear_program.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class DesignProgram : public NonlinearProgram {
  public:
@@ -77,4 +77,4 @@ class DesignProgram : public NonlinearProgram {
 
 inline constexpr double kConstraintTolerance = 1e-8;  // relative to the size of the bounds: what counts as held
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

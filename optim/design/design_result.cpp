@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 std::string DesignConstraint::in_words() const {
   return load_case.empty() ? objective : fmt::format("{} ({})", objective, load_case);
@@ -15,4 +15,4 @@ bool DesignResult::is_at_boundary() const {
          std::ranges::any_of(constraints, [](const DesignConstraint& c) { return c.at_lower || c.at_upper; });
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -10,7 +10,7 @@
 #include "optim/objective/case_evaluator.hpp"
 #include "optim/solver/nonlinear_program.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct DesignVariable {
   std::string name, unit;
@@ -101,4 +101,4 @@ struct DesignResult {
   }
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -13,7 +13,7 @@
 #include "optim/solver/nlopt_solver.hpp"
 #include "optim/solver/optimality.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // The options of every solver of nonlinear programs.
@@ -169,4 +169,4 @@ LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, 
   return rounds;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -15,7 +15,7 @@
 #include "optim/problem/problem.hpp"
 #include "optim/solver/evaluated_points.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The solution of the last round.
 struct LimitedSolution {
@@ -34,4 +34,4 @@ struct SearchHooks {
 LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, CaseEvaluator& evaluator,
                                 const Eigen::VectorXd& x_start, const SearchHooks& hooks, DesignResult& result);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

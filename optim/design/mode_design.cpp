@@ -12,7 +12,7 @@
 #include "optim/design/single_design.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Times the tolerance: docs/design-optimisation.md, `converged`.
@@ -148,4 +148,4 @@ DesignResult design_in_mode(const Problem& given, const DesignOptions& options) 
   return result;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -8,7 +8,7 @@
 #include "optim/design/design_result.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct StartModes {
   std::vector<AssemblyMode> modes;
@@ -21,4 +21,4 @@ StartModes modes_at(const Scene& scene, const DesignOptions& options);
 // options.mode must be there.
 DesignResult design_in_mode(const Problem& problem, const DesignOptions& options);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -12,7 +12,7 @@
 #include "optim/problem/bounded_means.hpp"
 #include "optim/solver/nlopt_solver.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 const DesignSpec& checked(const Problem& problem) {
@@ -124,4 +124,4 @@ std::optional<double> PreparedDesign::sharpness() {
   return DesignSpec::kSharpness / (largest > 0 ? largest : 1);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -16,7 +16,7 @@
 #include "optim/problem/problem.hpp"
 #include "optim/problem/variable_scaling.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct PreparedDesign {
   // Throws std::invalid_argument if problem.design makes no sense. progress: of each simulation.
@@ -38,4 +38,4 @@ struct PreparedDesign {
 std::vector<Parameter> chosen(const Scene& scene, const std::vector<int>& indices);
 std::vector<std::string> objective_names(const DesignSpec& spec);  // what is minimised, then what is bounded
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -14,7 +14,7 @@
 #include "optim/design/start_differences.hpp"
 #include "optim/machine/stopwatch.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 class SingleDesign {
@@ -113,4 +113,4 @@ DesignResult single_design(const Problem& problem, const DesignOptions& options)
   return SingleDesign(problem, options).run();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -5,8 +5,8 @@
 #include "optim/design/design_result.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 DesignResult single_design(const Problem& problem, const DesignOptions& options);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -8,7 +8,7 @@
 #include "optim/objective/gradient_doubts.hpp"
 #include "optim/objective/integration_error.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Compares the derivatives of all objectives of an evaluator.
@@ -64,4 +64,4 @@ std::vector<std::string> difference_warnings(const CaseEvaluation& start, CaseEv
   return warnings;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

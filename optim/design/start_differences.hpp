@@ -7,10 +7,10 @@
 
 #include "optim/objective/case_evaluator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Warnings of derivatives that disagree. go_on: asked before every difference, in any thread.
 std::vector<std::string> difference_warnings(const CaseEvaluation& start, CaseEvaluator& evaluator,
                                              const std::function<bool()>& go_on);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

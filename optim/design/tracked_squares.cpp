@@ -11,7 +11,7 @@
 #include "core/simulate/simulation.hpp"
 #include "optim/solver/limit_multipliers.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::VectorXd;
@@ -218,4 +218,4 @@ NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& eva
   return result;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

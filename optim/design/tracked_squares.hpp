@@ -12,7 +12,7 @@
 #include "optim/design/design_program.hpp"
 #include "optim/solver/least_squares.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class TrackedSquares : public LeastSquaresProblem {
  public:
@@ -56,4 +56,4 @@ NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& eva
                                 const OptimizerSpec& spec, const std::function<bool(const NlpProgress&)>& progress,
                                 PointRecords* records, long& simulations);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // All relative to the size of the bounds.
@@ -103,4 +103,4 @@ double TrueLimits::slope(Eigen::Index constraint) const {
   return limit == limits_.end() ? 1 : limit->slope;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -20,7 +20,7 @@
 #include "optim/objective/case_evaluator.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Tolerance of an equality relative to its size; inequalities hold exactly.
 inline constexpr double kTrueLimitTolerance = 1e-6;
@@ -66,4 +66,4 @@ class TrueLimits {
   int rounds_ = 0;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

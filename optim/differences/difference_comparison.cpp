@@ -10,7 +10,7 @@
 #include "optim/machine/on_threads.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kStep = 1e-3;     // of the variable's size
@@ -166,4 +166,4 @@ std::vector<std::string> DifferenceComparison::warnings() const {
   return said;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -18,7 +18,7 @@
 
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct ComparedVariable {
   std::string name;
@@ -49,4 +49,4 @@ struct DifferenceComparison {
   std::vector<std::string> warnings() const;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

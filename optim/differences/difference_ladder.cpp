@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // One rung: the difference quotient, and the largest values in it.
@@ -76,4 +76,4 @@ LadderDerivative one_sided_ladder(const LadderFunction& f, const Eigen::VectorXd
   return climb(rung_at, f0.size(), 2, kAmplification, 1, options);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

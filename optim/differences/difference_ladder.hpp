@@ -18,7 +18,7 @@
 #include <limits>
 #include <optional>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct LadderDerivative {
   Eigen::VectorXd derivative;
@@ -50,4 +50,4 @@ LadderDerivative difference_ladder(const LadderFunction& f, Eigen::Index size, c
 LadderDerivative one_sided_ladder(const LadderFunction& f, const Eigen::VectorXd& f0,
                                   const LadderOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

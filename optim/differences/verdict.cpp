@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {
     case Verdict::agrees:
@@ -29,4 +29,4 @@ Verdict verdict_of(double found, double error, double expected, double entry, do
   return Verdict::disagrees;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 enum class Verdict {
   agrees,  // to the threshold
@@ -22,4 +22,4 @@ inline bool passes(Verdict verdict) { return verdict != Verdict::failed && verdi
 // error, trusted to some times its estimate, counts only if it hides the entry at this threshold.
 Verdict verdict_of(double found, double error, double expected, double entry, double threshold);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

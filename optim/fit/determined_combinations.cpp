@@ -12,7 +12,7 @@
 #include "core/linear/dense.hpp"
 #include "optim/fit/sums_of_products.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -200,4 +200,4 @@ std::vector<std::string> determined_combinations(const MatrixXd& null_space, con
   return words;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Returns the combinations of parameters that data determine, in words. The independent columns of null_space are
 // changes of the parameters over their positive sizes, rho their values. `units` has "" for an unknown unit, or is
@@ -28,4 +28,4 @@ std::vector<std::string> determined_combinations(const Eigen::MatrixXd& null_spa
 // Parameters that the directions change.
 std::vector<bool> changed_parameters(const Eigen::MatrixXd& null_space);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

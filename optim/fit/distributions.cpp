@@ -5,7 +5,7 @@
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using boost::math::cdf;
 using boost::math::complement;
@@ -37,4 +37,4 @@ double chi_squared_tail(double degrees_of_freedom, double x) {
 double normal_tail(double x) { return cdf(complement(Normal(), x)); }
 double f_tail(double degrees1, double degrees2, double x) { return cdf(complement(FisherF(degrees1, degrees2), x)); }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

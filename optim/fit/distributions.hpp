@@ -1,7 +1,7 @@
 // Quantiles and tails of distributions, from Boost, whose functions take seconds to compile.
 #pragma once
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 double normal_quantile(double probability);
 double student_quantile(double degrees_of_freedom, double probability);
@@ -12,4 +12,4 @@ double chi_squared_tail(double degrees_of_freedom, double x);
 double normal_tail(double x);
 double f_tail(double degrees1, double degrees2, double x);  // of the F distribution
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -19,7 +19,7 @@
 #include "optim/objective/obstructed_parameters.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 Program compiled(const Field& field, const Symbols& symbols, const std::string& place) {
@@ -414,4 +414,4 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
   return Reading(*this, u, limits).residuals();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

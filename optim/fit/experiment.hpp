@@ -22,15 +22,13 @@
 #include <vector>
 
 #include "core/expression/program.hpp"
+#include "core/mechanism/scene_programs.hpp"
 #include "core/simulate/simulation.hpp"
 #include "optim/fit/state_chart.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
-
-class ScenePrograms;
-struct UserForce;
+namespace mbsopt::inline optim {
 
 struct ExperimentLimits {
   std::function<bool(double t)> progress;  // after accepted steps; false stops
@@ -137,4 +135,4 @@ class Experiment {
   std::optional<StateChart> start_chart_, end_chart_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

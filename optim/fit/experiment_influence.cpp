@@ -8,7 +8,7 @@
 #include "optim/fit/determined_combinations.hpp"
 #include "optim/solver/bounded_linear_least_squares.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -133,4 +133,4 @@ std::vector<OthersWithout> others_without(const ExperimentStack& stack, const Le
   return all;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -15,7 +15,7 @@
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/solver/levenberg_marquardt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The others, without one group.
 struct OthersWithout {
@@ -32,4 +32,4 @@ std::vector<OthersWithout> others_without(const ExperimentStack& stack, const Le
                                           const std::vector<UnknownParameter>& unknowns,
                                           const std::vector<std::size_t>& group_of_member);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -6,7 +6,7 @@
 
 #include "optim/machine/on_threads.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::VectorXd;
@@ -189,4 +189,4 @@ void ExperimentStack::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -18,7 +18,7 @@
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/solver/least_squares.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Keeps the residuals that an earlier run computed, and writes new ones down. A fit that was killed goes on from there.
 struct ResidualRecords {
@@ -76,4 +76,4 @@ class ExperimentStack : public LeastSquaresProblem {
   long simulations_ = 0;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

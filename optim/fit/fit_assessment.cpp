@@ -8,7 +8,7 @@
 
 #include "optim/fit/experiment_influence.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Numerical effects of causes that are the same by the physics differ by a few tolerances of the integration. A late
@@ -202,4 +202,4 @@ void compare_by_likelihood(FitContext& fit, const ExperimentStack& stack, const 
   fit.result.aic = 2 * k + twice, fit.result.bic = k * std::log(N) + twice;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -10,7 +10,7 @@
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/solver/levenberg_marquardt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Sets the names of all experiments in the result, also of those that cannot be scored.
 void name_experiments(FitContext& fit);
@@ -43,4 +43,4 @@ void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastS
 // sigmas: how many were estimated.
 void compare_by_likelihood(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& z, std::size_t sigmas);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

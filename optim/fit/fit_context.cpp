@@ -4,7 +4,7 @@
 
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 LeastSquaresOptions solver_options(const FitContext& fit) {
   LeastSquaresOptions solver;
@@ -30,4 +30,4 @@ std::vector<ExperimentStack::Member> fitted_members(const FitContext& fit,
   return members;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -13,7 +13,7 @@
 #include "optim/problem/problem.hpp"
 #include "optim/solver/levenberg_marquardt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct FitContext {
   const Scene& scene;
@@ -35,4 +35,4 @@ ExperimentStack::Member member(const FitContext& fit, std::size_t experiment, co
 std::vector<ExperimentStack::Member> fitted_members(const FitContext& fit,
                                                     const std::vector<UnknownParameter>& unknowns);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

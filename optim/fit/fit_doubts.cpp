@@ -13,7 +13,7 @@
 #include "optim/fit/sigma_estimation.hpp"
 #include "optim/problem/logged_columns.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
@@ -238,4 +238,4 @@ std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const std::vector<Ch
   return doubts;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -13,7 +13,7 @@
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/fit_context.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // A channel of a record: its samples, as rows of the stack, and the sizes of what the loss keeps of them.
 struct ChannelRecord {
@@ -50,4 +50,4 @@ struct AngleDoubt {
 std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const std::vector<ChannelRecord>& records,
                                      const ExperimentStack& stack, const Eigen::VectorXd& z_start);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

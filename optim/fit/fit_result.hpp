@@ -9,12 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "core/force/user_force.hpp"
 #include "optim/fit/residual_analysis.hpp"
 #include "optim/fit/statistics.hpp"
 #include "optim/problem/problem.hpp"
 #include "optim/solver/least_squares.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct FittedParameter {
   std::string name;        // "k1", or "run1.theta0" where it is free in an experiment
@@ -112,7 +113,6 @@ struct IdentificationResult {
   bool ok() const { return status == SolverStatus::converged || status == SolverStatus::no_progress; }
 };
 
-struct UserForce;        // core/force/user_force.hpp
 struct ResidualRecords;  // optim/fit/experiment_stack.hpp
 
 // Options of an identification that the problem does not give.
@@ -130,4 +130,4 @@ struct IdentificationOptions {
   std::function<bool(const std::string& name, double value, double tau)> profile_progress;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -7,7 +7,7 @@
 
 #include "optim/solver/equality_multipliers.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kGuess = 1e-4;        // tolerance of a search that only gives a start to the next one
@@ -187,4 +187,4 @@ LeastSquaresResult refit(const FitContext& fit, ExperimentStack& stack, const Ei
   });
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

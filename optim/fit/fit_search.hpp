@@ -14,7 +14,7 @@
 #include "optim/fit/sigma_estimation.hpp"
 #include "optim/solver/levenberg_marquardt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class FitSearch {
  public:
@@ -48,4 +48,4 @@ class FitSearch {
 // The refit of what validates, whose iterations are not those of the result; sigmas stay as they are.
 LeastSquaresResult refit(const FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& start);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

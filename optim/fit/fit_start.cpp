@@ -10,7 +10,7 @@
 #include "optim/machine/on_threads.hpp"
 #include "optim/objective/integration_error.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -111,4 +111,4 @@ FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data,
   return start;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -9,7 +9,7 @@
 
 #include "optim/fit/identification.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct FitStart {
   // The residuals and the scores of the fitted experiments, but for those that could not be simulated.
@@ -21,4 +21,4 @@ struct FitStart {
 FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data,
                       const IdentificationOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

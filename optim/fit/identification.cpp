@@ -23,7 +23,7 @@
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 const IdentificationSpec& checked(const Problem& problem, const std::vector<CsvTable>& data) {
@@ -254,4 +254,4 @@ Problem with_fitted_values(Problem problem, const IdentificationResult& fit) {
   return problem;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -23,7 +23,7 @@
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // problem.identification must be there; data: one table per experiment, in order. Throws std::invalid_argument where
 // the problem and the data do not fit, CsvError where the data are wrong.
@@ -33,4 +33,4 @@ IdentificationResult run_identification(const Problem& problem, const std::vecto
 // The problem with the fitted values in place of those from which the fit starts.
 Problem with_fitted_values(Problem problem, const IdentificationResult& fit);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

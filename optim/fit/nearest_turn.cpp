@@ -9,7 +9,7 @@
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // The columns of one experiment with "unwrap".
@@ -48,4 +48,4 @@ std::vector<std::string> move_to_nearest_turn(const Problem& problem, std::vecto
   return moved;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

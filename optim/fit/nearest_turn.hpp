@@ -10,9 +10,9 @@
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // data: a table per experiment. A record whose model cannot be simulated at the start stays.
 std::vector<std::string> move_to_nearest_turn(const Problem& problem, std::vector<CsvTable>& data);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -9,7 +9,7 @@
 #include "core/expression/did_you_mean.hpp"
 #include "optim/solver/equality_multipliers.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Point = ParameterProfile::Point;
@@ -177,4 +177,4 @@ ParameterProfile profile_of(FitContext& fit, ExperimentStack& stack, Eigen::Inde
   return profile;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -20,7 +20,7 @@
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/fit_context.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct ProfileOptions {
   Eigen::Index variable = 0;
@@ -43,4 +43,4 @@ std::vector<Eigen::Index> profiled_unknowns(const std::vector<std::string>& prof
 // The profile of fitted parameter k at the solution x.
 ParameterProfile profile_of(FitContext& fit, ExperimentStack& stack, Eigen::Index k, const Eigen::VectorXd& x);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -12,7 +12,7 @@
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/machine/on_threads.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // One channel of a motion: where its samples stand in the tables, what the model says there, and what it leaves.
@@ -144,4 +144,4 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
   return recovery;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

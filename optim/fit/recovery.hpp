@@ -19,7 +19,7 @@
 
 #include "optim/fit/identification.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct RecoveredParameter {
   std::string name, unit;
@@ -49,4 +49,4 @@ struct RecoveryOptions {
 Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationResult& fit,
                  const RecoveryOptions& options);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -7,7 +7,7 @@
 
 #include "optim/fit/distributions.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr Eigen::Index kFewest = 10;
@@ -62,4 +62,4 @@ std::string ResidualAnalysis::in_words() const {
   return fmt::format("correlated in time (lag 1: {:.2f})", autocorrelation);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

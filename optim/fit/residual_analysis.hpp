@@ -14,7 +14,7 @@
 #include <Eigen/Core>
 #include <string>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct ResidualAnalysis {
   std::size_t samples = 0;
@@ -33,4 +33,4 @@ struct ResidualAnalysis {
 // Fewer than 10 residuals, or all of them equal, say nothing: p = 1.
 ResidualAnalysis analyse_residuals(const Eigen::VectorXd& z);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

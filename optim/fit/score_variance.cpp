@@ -6,7 +6,7 @@
 
 #include "core/linear/dense.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -96,4 +96,4 @@ long ScoreVariance::freedom() const {
   return type_ == CovarianceType::newey_west ? std::lround(1.5 / kLagPart) : std::max(1L, records - 1);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

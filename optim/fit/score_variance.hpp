@@ -41,7 +41,7 @@
 
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Consecutive rows of the scores, at times that do not descend.
 struct SampledRecord {
@@ -74,4 +74,4 @@ class ScoreVariance {
   std::vector<SampledRecord> records_, motions_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -7,7 +7,7 @@
 
 #include "optim/machine/median.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kNormalMedian = 1.4826;  // 1 over the median of |x|, x normal
@@ -126,4 +126,4 @@ double SigmaEstimation::take(const Eigen::VectorXd& z) {
   return change;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

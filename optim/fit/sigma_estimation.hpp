@@ -28,7 +28,7 @@
 
 #include "optim/fit/experiment_stack.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 inline constexpr int kSigmaRounds = 40;
 inline constexpr double kNoisy = 2;           // times the noise: a sigma that no other optimum lowers by much
@@ -71,4 +71,4 @@ class SigmaEstimation {
   std::vector<Group> groups_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -3,7 +3,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/linear/dense.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -24,4 +24,4 @@ void StateChart::read(const VectorXd& y, const MatrixXd& y_rho, VectorXd& s, Mat
   s_rho = W_ * (sign.asDiagonal() * y_rho);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class StateChart {
  public:
@@ -24,4 +24,4 @@ class StateChart {
   Eigen::MatrixXd W_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

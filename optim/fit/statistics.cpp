@@ -9,7 +9,7 @@
 #include "optim/fit/determined_combinations.hpp"
 #include "optim/fit/distributions.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -271,4 +271,4 @@ void withhold_errors(FitStatistics& statistics, std::string why) {
   statistics.correlation.resize(0, 0);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -36,7 +36,7 @@
 #include "optim/problem/problem.hpp"
 #include "optim/solver/robust_loss.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct FitData {
   Eigen::MatrixXd J;        // N x P
@@ -86,4 +86,4 @@ FitStatistics fit_statistics(const FitData& data);
 // Takes away what holds at a minimum only: standard errors, intervals, correlations.
 void withhold_errors(FitStatistics& statistics, std::string why);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

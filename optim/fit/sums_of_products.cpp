@@ -7,7 +7,7 @@
 
 #include "core/expression/dimension.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -167,4 +167,4 @@ std::optional<std::vector<std::string>> sums_of_products(const MatrixXd& Q, cons
   return Search(Q, rho, size, names, units).run();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

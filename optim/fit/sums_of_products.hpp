@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Q: orthonormal columns, the gradients times size, a row per parameter. units: "" where not known. nullopt: no such
 // sums span the space.
@@ -26,4 +26,4 @@ std::optional<std::vector<std::string>> sums_of_products(const Eigen::MatrixXd& 
 // "m1 - 0.04*m2" of terms and their factors; the first factor is positive.
 std::string sum_in_words(const std::vector<double>& factors, const std::vector<std::string>& terms);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

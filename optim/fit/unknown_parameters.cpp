@@ -10,7 +10,7 @@
 
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // The value that an experiment gives a parameter; null if it gives none.
@@ -130,4 +130,4 @@ Eigen::VectorXd start_of(const std::vector<UnknownParameter>& unknowns) {
   return u;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

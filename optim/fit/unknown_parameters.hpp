@@ -13,7 +13,7 @@
 #include "optim/problem/problem.hpp"
 #include "optim/problem/variable_scaling.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct UnknownParameter {
   int parameter = 0;           // in the scene
@@ -56,4 +56,4 @@ std::vector<std::string> names_of(const std::vector<UnknownParameter>& unknowns,
 VariableScaling scaling_of(const std::vector<UnknownParameter>& unknowns);
 Eigen::VectorXd start_of(const std::vector<UnknownParameter>& unknowns);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

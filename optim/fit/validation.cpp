@@ -13,7 +13,7 @@
 #include "optim/fit/fit_search.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kWorse = 0.99;  // probability that a right model worsens what validates by less
@@ -165,4 +165,4 @@ void validate(FitContext& fit, std::size_t e) {
   fit.result.simulations += stack.simulations();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

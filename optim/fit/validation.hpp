@@ -6,8 +6,8 @@
 
 #include "optim/fit/fit_context.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 void validate(FitContext& fit, std::size_t experiment);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -4,7 +4,7 @@
 
 #include "optim/fit/distributions.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // The squares of the residuals of fitted samples over the sigmas of `scale`.
@@ -64,4 +64,4 @@ VariantComparison compare_variants(const IdentificationResult& first, const Iden
   return test;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

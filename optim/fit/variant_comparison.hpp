@@ -14,7 +14,7 @@
 
 #include "optim/fit/fit_result.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct VariantComparison {
   std::string none;            // why there is no test, in words
@@ -29,4 +29,4 @@ struct VariantComparison {
 
 VariantComparison compare_variants(const IdentificationResult& first, const IdentificationResult& second);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

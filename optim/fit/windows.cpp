@@ -17,7 +17,7 @@
 #include "optim/problem/parameter_values.hpp"
 #include "optim/solver/levenberg_marquardt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -274,4 +274,4 @@ CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>&
   return cut;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

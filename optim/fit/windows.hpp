@@ -15,12 +15,11 @@
 #include <string>
 #include <vector>
 
+#include "core/force/user_force.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
-
-struct UserForce;
+namespace mbsopt::inline optim {
 
 struct CutProblem {
   Problem problem;
@@ -34,4 +33,4 @@ CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>&
                             const std::vector<std::shared_ptr<const UserForce>>& user_forces = {},
                             const std::function<bool(double t)>& go_on = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Returns 0 if x is empty.
 inline double median(std::vector<double> x) {
@@ -14,4 +14,4 @@ inline double median(std::vector<double> x) {
   return *middle;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

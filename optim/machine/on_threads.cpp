@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 void on_threads(std::size_t jobs, int threads, const std::function<void(std::size_t job)>& work) {
   std::vector<std::exception_ptr> thrown(jobs);
@@ -34,4 +34,4 @@ void on_threads(std::size_t jobs, int threads, const std::function<void(std::siz
     if (exception) std::rethrow_exception(exception);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

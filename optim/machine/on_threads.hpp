@@ -6,10 +6,10 @@
 #include <cstddef>
 #include <functional>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Runs fewer at a time if the system has no further thread. Returns when all jobs have ended. Then it rethrows the
 // exception of the first job, in the order of the jobs, that threw one.
 void on_threads(std::size_t jobs, int threads, const std::function<void(std::size_t job)>& work);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

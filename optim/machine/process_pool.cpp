@@ -18,7 +18,7 @@
 
 #include "optim/machine/write_all.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr int kPollMilliseconds = 50;
@@ -161,4 +161,4 @@ void run_in_processes(const std::vector<int>& jobs, int workers, const std::func
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

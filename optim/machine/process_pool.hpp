@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct JobReply {
   int job = 0;
@@ -64,4 +64,4 @@ class ProcessPool {
 void run_in_processes(const std::vector<int>& jobs, int workers, const std::function<std::string(int job)>& work,
                       const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -5,7 +5,7 @@
 #include <functional>
 #include <utility>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Clock = std::function<double()>;  // [s]; empty: wall time
 
@@ -24,4 +24,4 @@ class Stopwatch {
   double start_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -4,7 +4,7 @@
 
 #include <cerrno>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 bool write_all(int descriptor, std::string_view text) {
   while (!text.empty()) {
@@ -16,4 +16,4 @@ bool write_all(int descriptor, std::string_view text) {
   return true;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -3,8 +3,8 @@
 
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 bool write_all(int descriptor, std::string_view text);  // false: errno says why
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

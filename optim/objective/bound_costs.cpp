@@ -12,7 +12,7 @@
 #include "core/scene/scene_path.hpp"
 #include "optim/objective/expression_cost.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -136,4 +136,4 @@ BoundCosts bound_costs(const Scene& scene, const UserCostSpec& spec, const std::
           spec.terminal ? std::make_shared<BoundTerminal>(inputs, spec.terminal) : nullptr};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -11,7 +11,7 @@
 #include "core/scene/scene.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct BoundCosts {
   std::shared_ptr<const RunningCost> running;    // null where there is none
@@ -22,4 +22,4 @@ struct BoundCosts {
 // that nothing provides.
 BoundCosts bound_costs(const Scene& scene, const UserCostSpec& spec, const std::string& place);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -9,7 +9,7 @@
 #include "optim/problem/load_cases.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 CaseEvaluator::CaseEvaluator(const Problem& problem, const std::vector<std::string>& objectives,
                              const std::vector<std::string>& variables, const EvaluatorOptions& options, int threads)
@@ -107,4 +107,4 @@ std::vector<std::optional<double>> CaseEvaluator::true_values(const Eigen::Vecto
   return all;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

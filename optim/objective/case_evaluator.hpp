@@ -17,7 +17,7 @@
 #include "optim/objective/evaluator.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // psi and its derivatives case by case, each with all objectives. ok holds if all cases are ok. Statistics are those of
 // the first.
@@ -67,4 +67,4 @@ class CaseEvaluator {
   CaseEvaluation last_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

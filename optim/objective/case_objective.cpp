@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -43,4 +43,4 @@ double CaseObjective::true_value(const VectorXd& psi) const {
   return is_maximum() ? x.maxCoeff() : x.sum();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

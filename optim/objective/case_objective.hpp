@@ -9,7 +9,7 @@
 
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class CaseObjective {
  public:
@@ -30,4 +30,4 @@ class CaseObjective {
   double k_ = 0;  // 0: a sum
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

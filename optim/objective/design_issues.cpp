@@ -11,7 +11,7 @@
 #include "optim/problem/bounded_means.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 std::vector<DesignIssue> missing_bounds(const std::vector<std::string>& variables, const Scene& scene,
                                         const std::string& by) {
@@ -166,4 +166,4 @@ std::optional<DesignIssue> curvature_issue(const Problem& problem) {
           "derivatives and is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or 'exact'"};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

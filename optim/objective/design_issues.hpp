@@ -7,7 +7,7 @@
 
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct DesignIssue {
   std::string path, message;
@@ -26,4 +26,4 @@ std::vector<DesignIssue> missing_bounds(const std::vector<std::string>& variable
 // Reports more starts than any machine runs. path: of the multistart.
 std::vector<DesignIssue> starts_issues(const MultistartSpec& spec, const std::string& path);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -20,7 +20,7 @@
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 std::string_view to_string(GradientMethod method) {
   switch (method) {
     case GradientMethod::tlm:
@@ -371,4 +371,4 @@ Evaluation Evaluator::gradients(const Eigen::VectorXd& rho) {
   return last_;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

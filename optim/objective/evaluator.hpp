@@ -19,7 +19,7 @@
 #include "optim/objective/objective.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // tlm and adjoint are the derivatives of the computed numbers; CVODES has none of these and gives its own. With
 // cvodes_*, CVODES computes the motion and its continuous sensitivities for any integrator of the scene (cvodes.hpp).
@@ -123,4 +123,4 @@ class Evaluator {
   long simulations_ = 0;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -7,7 +7,7 @@
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/signals.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct CostExpression::Compiled : SwitchedProgram {
   struct UsedSensor {
@@ -182,4 +182,4 @@ std::shared_ptr<const PointCost> CostExpression::bind(const Mechanism& mechanism
   return std::make_shared<ExpressionCost<Compiled>>(compiled_, mechanism);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

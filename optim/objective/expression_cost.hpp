@@ -18,7 +18,7 @@
 #include "core/run/cost.hpp"
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The names in an objective: parameters (inputs 0..P-1), "t" (input P), sensors (from P+1), definitions, signals.
 Symbols cost_symbols(const Scene& scene);
@@ -52,4 +52,4 @@ class CostExpression {
   bool is_zero_ = false;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -15,7 +15,7 @@
 #include "optim/differences/difference_ladder.hpp"
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -192,4 +192,4 @@ double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces,
   return value_of(lambda);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -18,9 +18,7 @@
 #include "core/start/linearisation.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
-
-struct UserForce;
+namespace mbsopt::inline optim {
 
 class FollowedMode {
  public:
@@ -47,4 +45,4 @@ class FollowedMode {
   std::unique_ptr<Reference> reference_;  // the shape at the scene's own values, once known
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -7,7 +7,7 @@
 
 #include "core/simulate/simulation.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -302,4 +302,4 @@ std::vector<FreeInstants::Instant> FreeInstants::nearest(const Mechanism& mechan
   return instants;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

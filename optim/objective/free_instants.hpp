@@ -29,7 +29,7 @@
 #include "optim/objective/expression_cost.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The motion has no instants, because it could not be solved.
 struct NoMotion : std::runtime_error {
@@ -83,4 +83,4 @@ class FreeInstants {
   std::vector<Point> points_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

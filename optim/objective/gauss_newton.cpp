@@ -8,7 +8,7 @@
 
 #include "optim/objective/hessian.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -138,4 +138,4 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
   return result;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

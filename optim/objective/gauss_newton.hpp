@@ -20,7 +20,7 @@
 
 #include "optim/objective/evaluator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct GaussNewton {
   bool ok = false;
@@ -32,4 +32,4 @@ struct GaussNewton {
 // std::invalid_argument for objectives written in C++, which have no second derivatives, and for CVODES' integrators.
 GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -11,7 +11,7 @@
 #include "optim/differences/verdict.hpp"
 #include "optim/objective/integration_error.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::VectorXd;
@@ -104,4 +104,4 @@ std::vector<std::string> gradient_doubts(const Evaluator& evaluator, const Evalu
                               {(e.psi - at.psi).cwiseAbs(), (e.psi_rho - at.psi_rho).cwiseAbs()});
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

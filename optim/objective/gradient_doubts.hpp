@@ -18,8 +18,8 @@
 
 #include "optim/objective/evaluator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 std::vector<std::string> gradient_doubts(const Evaluator& evaluator, const Evaluation& gradients);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -12,7 +12,7 @@
 #include "optim/differences/difference_ladder.hpp"
 #include "optim/machine/stopwatch.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -297,4 +297,4 @@ std::string hessian_method(GradientMethod method) {
                                           : "adjoint");
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

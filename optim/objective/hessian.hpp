@@ -23,7 +23,7 @@
 
 #include "optim/objective/evaluator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct HessianOptions {
   // The largest step, relative to the parameter's size (typical_size). In a direction, its largest component in sizes
@@ -76,4 +76,4 @@ HessianProducts hessian_products(Evaluator& evaluator, const Eigen::VectorXd& rh
 // The method in words, for results: "central differences (one-sided on a bound) of the adjoint gradient on frozen ...".
 std::string hessian_method(GradientMethod method);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

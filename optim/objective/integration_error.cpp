@@ -7,7 +7,7 @@
 
 #include "core/tableau/tableaus.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kTightest = 1e-12;  // rounding starves the step-size control beyond
@@ -107,4 +107,4 @@ std::vector<std::string> unresolved_gradients(const Scene& scene, const std::vec
   return sentences;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -13,10 +13,9 @@
 #include "core/scene/scene.hpp"
 #include "optim/objective/evaluator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class Objective;
-struct UserForce;
 
 struct IntegrationError {
   Eigen::VectorXd psi;      // per objective, >= 0
@@ -58,4 +57,4 @@ std::vector<std::string> unresolved_gradients(const Scene& scene, const std::vec
                                               const Eigen::VectorXd& psi, const Eigen::MatrixXd& psi_rho,
                                               const IntegrationError& error);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

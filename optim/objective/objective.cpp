@@ -13,7 +13,7 @@
 #include "core/scene/signals.hpp"
 #include "optim/objective/bound_costs.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Adds the objective's name to an exception of f.
@@ -274,4 +274,4 @@ std::vector<Objective> objectives_of(const Problem& problem, const std::vector<s
   return result;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

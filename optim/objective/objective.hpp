@@ -28,7 +28,7 @@
 #include "optim/objective/free_instants.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // A mean in psi, with its factor. side is 1 for a maximum, -1 for a minimum, 0 for neither.
 struct ObjectivePart {
@@ -114,4 +114,4 @@ class Objective {
 // Returns the named objectives of a problem, or all if names is empty. Throws std::invalid_argument for unknown names.
 std::vector<Objective> objectives_of(const Problem& problem, const std::vector<std::string>& names = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

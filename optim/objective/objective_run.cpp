@@ -9,7 +9,7 @@
 #include "core/cvodes/cvodes.hpp"
 #include "core/run/output_times.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // The largest of successive values, and places where the value may be larger. Tops of parabolas through each three
@@ -199,4 +199,4 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
   return values;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

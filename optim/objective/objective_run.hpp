@@ -14,7 +14,7 @@
 #include "core/simulate/simulation.hpp"
 #include "optim/objective/objective.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class ObjectiveRun {
  public:
@@ -55,4 +55,4 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
                                                  const StepSequence& steps,
                                                  const std::function<bool(double t)>& progress = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

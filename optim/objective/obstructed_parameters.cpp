@@ -6,7 +6,7 @@
 
 #include "core/start/assembly.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 void require_unobstructed(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
                           const std::vector<std::shared_ptr<const UserForce>>& user_forces) {
@@ -27,4 +27,4 @@ void require_unobstructed(const Scene& scene, const Eigen::VectorXd& rho, const 
   if (!words.empty()) throw std::invalid_argument(words);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

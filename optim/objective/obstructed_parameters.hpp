@@ -5,11 +5,11 @@
 
 #include "core/mechanism/mechanism.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Throws std::invalid_argument with the names of the obstructed parameters among the active ones, at these values. A
 // scene that cannot be assembled there has none.
 void require_unobstructed(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
                           const std::vector<std::shared_ptr<const UserForce>>& user_forces = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

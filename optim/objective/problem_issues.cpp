@@ -15,7 +15,7 @@
 #include "optim/problem/logged_columns.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 namespace {
 
@@ -436,4 +436,4 @@ std::vector<SceneIssue> find_issues(const Problem& problem) {
   return without_repetitions(std::move(issues));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -8,7 +8,7 @@
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/state_point.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 
@@ -79,4 +79,4 @@ double MotionDistance::extent(const SampledMotion& motion, const Eigen::VectorXd
   return largest;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

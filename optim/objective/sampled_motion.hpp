@@ -13,7 +13,7 @@
 #include "core/mechanism/mechanism.hpp"
 #include "core/simulate/simulation.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct SampledMotion {
   std::vector<double> times;
@@ -46,4 +46,4 @@ class MotionDistance {
   double total_ = 0;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

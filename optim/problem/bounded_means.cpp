@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 std::optional<std::size_t> bounded_mean(const ObjectiveBound& bound) {
   for (std::size_t k = 0; k < bound.means.size(); ++k)
@@ -67,4 +67,4 @@ void name_bounded_means(Problem& problem) {
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -13,7 +13,7 @@
 
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The entry of kMeanKinds that a bound gives in place of an objective; the first one if it gives several.
 std::optional<std::size_t> bounded_mean(const ObjectiveBound& bound);
@@ -27,4 +27,4 @@ std::string name_of_mean(std::size_t kind, const Expression& of);  // "maximum_o
 // ObjectiveBound::kSharpness/max(|lower|, |upper|), over 1 if that is 0: the expression has the size of its limit.
 void name_bounded_means(Problem& problem);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -14,7 +14,7 @@
 #include "core/expression/dimension.hpp"
 #include "optim/problem/regular_file.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
@@ -312,4 +312,4 @@ const std::vector<double>& ascending_times(const CsvTable& table, std::string_vi
   return t;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -20,7 +20,7 @@
 #include <string_view>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // "run1.csv:17:5: ...": the fault, with line and column if there are any.
 class CsvError : public std::runtime_error {
@@ -59,4 +59,4 @@ ColumnHeader parts_of_header(std::string_view header);
 // Returns a column of times: every cell is finite and later than the one before. Throws CsvError with the row.
 const std::vector<double>& ascending_times(const CsvTable& table, std::string_view column_name);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

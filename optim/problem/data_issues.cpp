@@ -13,7 +13,7 @@
 #include "core/scene/signals.hpp"
 #include "optim/problem/logged_columns.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // A record farther from the start than this, in its own lengths, was not meant to be reached by a simulation. Its clock
@@ -275,4 +275,4 @@ std::vector<SceneIssue> find_data_issues(const ExperimentSpec& experiment, const
   return DataCheck(experiment, place, data, scene).issues();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

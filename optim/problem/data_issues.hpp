@@ -10,10 +10,10 @@
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // place is "identification.experiments[0]". scene gives its start time and its sensors.
 std::vector<SceneIssue> find_data_issues(const ExperimentSpec& experiment, const std::string& place,
                                          const CsvTable& data, const Scene& scene);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -6,7 +6,7 @@
 
 #include "core/expression/syntax_tree.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 bool is_overridden(const CaseSpec& load_case, const std::string& parameter) {
@@ -85,4 +85,4 @@ std::vector<Problem> problems_of_cases(const Problem& problem) {
   return problems;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -14,7 +14,7 @@
 
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Returns the case without the cases and the identification. Its design has the same variables, under their names in
 // the case.
@@ -29,4 +29,4 @@ std::string in_names_of_problem(std::string words, const CaseSpec& load_case, co
 // The problems of all cases, or the problem itself without cases.
 std::vector<Problem> problems_of_cases(const Problem& problem);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

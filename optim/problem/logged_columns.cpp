@@ -10,7 +10,7 @@
 #include <numeric>
 #include <set>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kStandardGravity = 9.80665;  // m/s^2, exact (CGPM 1901)
@@ -218,4 +218,4 @@ CsvTable read_record(const ExperimentSpec& experiment, std::vector<std::string>*
   return std::move(record);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

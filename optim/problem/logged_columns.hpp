@@ -18,7 +18,7 @@
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 std::optional<Unit> parse_column_unit(std::string_view text);
 // The unit of a channel's column as the problem or the file states it; empty: neither does.
@@ -44,4 +44,4 @@ void read_curve(SampleColumn& samples, Interpolation how, bool missing, bool by_
 // request. read receives the conversions. Throws CsvError.
 CsvTable read_record(const ExperimentSpec& experiment, std::vector<std::string>* read = nullptr);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

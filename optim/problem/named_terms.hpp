@@ -23,7 +23,7 @@
 #include "core/force/user_force.hpp"
 #include "core/run/cost.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct NamedForce {
   std::string name;
@@ -81,4 +81,4 @@ class NamedTerms {
   std::vector<NamedLaw> laws_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

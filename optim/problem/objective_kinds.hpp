@@ -12,7 +12,7 @@
 #include <cmath>
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // A function of one number, and its first two derivatives.
 struct Jet {
@@ -51,4 +51,4 @@ inline constexpr MeanKind kMeanKinds[] = {
     {"rms_of", "alone: root of its mean square over time", square, root},
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

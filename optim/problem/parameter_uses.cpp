@@ -4,7 +4,7 @@
 #include "core/scene/scene_facts.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 std::vector<ParameterUse> parameter_uses(const Problem& problem) {
   const SceneFacts facts(problem.scene);
@@ -23,4 +23,4 @@ std::vector<ParameterUse> parameter_uses(const Problem& problem) {
   return uses;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

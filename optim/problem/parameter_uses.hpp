@@ -6,7 +6,7 @@
 
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct ParameterUse {
   std::string parameter;
@@ -15,4 +15,4 @@ struct ParameterUse {
 
 std::vector<ParameterUse> parameter_uses(const Problem& problem);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

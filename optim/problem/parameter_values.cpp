@@ -8,7 +8,7 @@
 
 #include "core/expression/did_you_mean.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 Eigen::VectorXd parameter_values(const Scene& scene) {
   Eigen::VectorXd rho(static_cast<Eigen::Index>(scene.parameters.size()));
@@ -40,4 +40,4 @@ double typical_size(const Parameter& parameter, double value) {
   return 1;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

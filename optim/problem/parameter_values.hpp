@@ -7,7 +7,7 @@
 
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 Eigen::VectorXd parameter_values(const Scene& scene);  // the scene's values
 
@@ -17,4 +17,4 @@ std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::st
 // The size of a parameter for differences and Taylor steps: |value|, or the range of its bounds, or 1.
 double typical_size(const Parameter& parameter, double value);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -14,7 +14,7 @@
 #define MBSOPT_TEXT_OF(x) #x
 #define MBSOPT_TEXT(x) MBSOPT_TEXT_OF(x)
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The layout of passed objects depends on the classes of this version, the compiler's ABI, and the alignment of Eigen's
 // vectors. -march changes the last one.
@@ -22,7 +22,7 @@ inline constexpr const char* kPluginInterface =
     "mbsopt 0.1, ABI " MBSOPT_TEXT(__GXX_ABI_VERSION) ", Eigen " MBSOPT_TEXT(EIGEN_WORLD_VERSION) "." MBSOPT_TEXT(
         EIGEN_MAJOR_VERSION) "." MBSOPT_TEXT(EIGEN_MINOR_VERSION) " aligned to " MBSOPT_TEXT(EIGEN_MAX_ALIGN_BYTES);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim
 
 #define MBSOPT_PLUGIN(terms)                                                            \
   extern "C" const char* mbsopt_plugin_interface() { return mbsopt::kPluginInterface; } \

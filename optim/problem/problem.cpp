@@ -1,6 +1,6 @@
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 IdentificationSpec::IdentificationSpec() = default;
 IdentificationSpec::IdentificationSpec(const IdentificationSpec&) = default;
@@ -16,4 +16,4 @@ Problem& Problem::operator=(const Problem&) = default;
 Problem& Problem::operator=(Problem&&) noexcept = default;
 Problem::~Problem() = default;
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -14,7 +14,7 @@
 #include "optim/problem/objective_kinds.hpp"
 #include "optim/solver/robust_loss.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct ObjectiveSample {
   double time = 0;   // [s]
@@ -229,4 +229,4 @@ struct Problem {  // the same
   std::vector<std::string> columns_read = {};  // conversions to SI, in words
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -7,7 +7,7 @@
 #include "optim/problem/problem.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 inline std::string_view optimizer_names() {
   static const std::string names = "ipopt least_squares " + std::string(nlopt_method_names());
@@ -242,4 +242,4 @@ void describe(auto& v, Like<Problem> auto& p) {
   v.object("identification", p.identification, {"fit of parameters to measurements"});
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

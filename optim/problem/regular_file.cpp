@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 struct Descriptor {
@@ -45,4 +45,4 @@ std::string content_of_regular_file(const std::filesystem::path& file, std::size
   }
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

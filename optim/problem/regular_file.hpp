@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The reason why a file cannot be read, without its name.
 class FileError : public std::runtime_error {
@@ -21,4 +21,4 @@ class FileError : public std::runtime_error {
 std::string content_of_regular_file(const std::filesystem::path& file,
                                     std::size_t at_most = std::numeric_limits<std::size_t>::max());
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

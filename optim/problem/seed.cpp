@@ -2,11 +2,11 @@
 
 #include <random>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 long drawn_seed() {
   std::random_device system;
   return static_cast<long>(system() & 0x7fffffffU);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

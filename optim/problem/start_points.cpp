@@ -9,7 +9,7 @@
 
 #include "optim/problem/variable_scaling.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -73,4 +73,4 @@ std::vector<Eigen::VectorXd> start_values(const std::vector<Parameter>& paramete
   return starts;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

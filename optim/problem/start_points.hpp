@@ -17,7 +17,7 @@
 #include "core/scene/scene.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Returns count points of the unit cube, one per column.
 Eigen::MatrixXd unit_points(StartSampling sampling, Eigen::Index dimension, Eigen::Index count, long seed);
@@ -26,4 +26,4 @@ Eigen::MatrixXd unit_points(StartSampling sampling, Eigen::Index dimension, Eige
 std::vector<Eigen::VectorXd> start_values(const std::vector<Parameter>& parameters, const MultistartSpec& spec,
                                           long seed);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -13,7 +13,7 @@
 #include "optim/problem/load_cases.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 namespace {
 
@@ -368,4 +368,4 @@ std::vector<SceneIssue> find_idle_variables(const Problem& problem) {
   return issues;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

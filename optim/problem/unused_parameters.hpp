@@ -16,7 +16,7 @@
 #include "core/scene/issues.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The problem must have no other issues.
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
@@ -37,4 +37,4 @@ Problem what_measurements_need(const Problem& problem, std::vector<std::string>*
 // parameters of an identification without effect on its channels. They may affect other objectives of the problem.
 std::vector<SceneIssue> find_idle_variables(const Problem& problem);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

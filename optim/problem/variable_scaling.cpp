@@ -8,7 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -129,4 +129,4 @@ Eigen::VectorXd VariableScaling::rho_xx(const Eigen::VectorXd& x) const {
   return d;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -18,7 +18,7 @@
 
 #include "core/scene/scene.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 inline constexpr double kWideRange = 100;  // times the size of a value: it tells nothing of a wider range
 
@@ -53,4 +53,4 @@ class VariableScaling {
   Eigen::VectorXd x_lower_, x_upper_, rho_lower_, rho_upper_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -92,4 +92,4 @@ VectorXd bounded_linear_least_squares(const RowBlocks& A, const VectorXd& b, con
   return ActiveSet(A, b, lower, upper).solve();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -15,10 +15,10 @@
 
 #include "optim/solver/row_blocks.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Held variables have exactly the value of their bound.
 Eigen::VectorXd bounded_linear_least_squares(const RowBlocks& A, const Eigen::VectorXd& b, const Eigen::VectorXd& lower,
                                              const Eigen::VectorXd& upper);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -118,4 +118,4 @@ LeastSquaresResult solve_with_equalities(LeastSquaresProblem& problem, const Vec
   return all;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

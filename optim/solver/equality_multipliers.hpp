@@ -14,10 +14,10 @@
 
 #include "optim/solver/levenberg_marquardt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // For a problem without equations this is solve_least_squares. The last rows of result.point are c.
 LeastSquaresResult solve_with_equalities(LeastSquaresProblem& problem, const Eigen::VectorXd& x_start,
                                          const LeastSquaresOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -6,7 +6,7 @@
 #include <new>
 #include <utility>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr std::size_t kRemembered = 1000;  // points; solvers go back to recent ones only
@@ -95,4 +95,4 @@ void EvaluatedPoints::keep_best(const NlpPoint& point) {
   if (is_better_) best_x_ = x_, best_ = point, have_best_ = true;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

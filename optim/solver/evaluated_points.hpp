@@ -14,7 +14,7 @@
 
 #include "optim/solver/nonlinear_program.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class EvaluatedPoints {
  public:
@@ -65,4 +65,4 @@ Eigen::VectorXd near_bounds(const Eigen::VectorXd& bounds, const Eigen::VectorXd
 // feasible.
 bool is_better(double f, double violations, double than_f, double than_violations);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

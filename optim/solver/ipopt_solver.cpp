@@ -18,7 +18,7 @@
 #include "optim/solver/optimality.hpp"
 #include "optim/solver/secant_curvature.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Ipopt::Index;
@@ -417,4 +417,4 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
   return result;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

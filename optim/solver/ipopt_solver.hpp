@@ -13,7 +13,7 @@
 
 #include "optim/solver/nonlinear_program.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct IpoptOptions {
   double tolerance = 1e-6;             // of the scaled optimality conditions, > 0
@@ -31,4 +31,4 @@ struct IpoptOptions {
 // Never throws because of an evaluation: exceptions of evaluate() are failed evaluations, too.
 NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

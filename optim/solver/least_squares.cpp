@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::VectorXd;
@@ -42,4 +42,4 @@ double LeastSquaresProblem::cost(const VectorXd& z) const {
 
 VectorXd LeastSquaresProblem::pull(const VectorXd& z) const { return weights(z).cwiseProduct(z); }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -29,7 +29,7 @@
 #include "optim/solver/robust_loss.hpp"
 #include "optim/solver/solver_outcome.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct LeastSquaresPoint {
   bool ok = true;
@@ -96,4 +96,4 @@ struct LeastSquaresResult : SolverOutcome {
   double promised = 0;  // part of the cost that a step along one variable would gain by the derivatives
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -11,7 +11,7 @@
 #include "core/linear/dense.hpp"
 #include "optim/solver/bounded_linear_least_squares.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -420,4 +420,4 @@ long search_on(LeastSquaresProblem& round, const LeastSquaresOptions& options, L
   return failed;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

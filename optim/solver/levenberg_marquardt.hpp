@@ -44,7 +44,7 @@
 #include "optim/solver/least_squares.hpp"
 #include "optim/solver/residual_curvature.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // Errors of the simulation may amount to this part of the cost. At a minimum, with rtol 1e-5, the derivatives promise
 // less than 1e-8 of the cost of the start. In front of failed points, or with wrong derivatives, they promise most of
@@ -77,4 +77,4 @@ LeastSquaresResult solve_least_squares(LeastSquaresProblem& problem, const Eigen
 // own failures.
 long search_on(LeastSquaresProblem& round, const LeastSquaresOptions& options, LeastSquaresResult& all);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -149,4 +149,4 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
   return all;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -15,7 +15,7 @@
 
 #include "optim/solver/levenberg_marquardt.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // c is in units of the size of its limits. Without limits this is solve_least_squares. The last rows of result.point
 // are c.
@@ -23,4 +23,4 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Eigen
                                        const Eigen::VectorXd& c_upper, const Eigen::VectorXd& x_start,
                                        const LeastSquaresOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

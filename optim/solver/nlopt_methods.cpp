@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using enum ConstraintSupport;
@@ -81,4 +81,4 @@ std::string nlopt_refusal(const NloptMethod& method, const NloptNeeds& needs) {
   return {};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

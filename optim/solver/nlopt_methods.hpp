@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 enum class ConstraintSupport { none, inequalities, all, augmented_lagrangian };
 
@@ -36,4 +36,4 @@ struct NloptNeeds {
 // The reason why the method cannot solve such a problem, with methods that can; empty if it can.
 std::string nlopt_refusal(const NloptMethod& method, const NloptNeeds& needs);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

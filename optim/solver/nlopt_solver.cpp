@@ -18,7 +18,7 @@
 #include "optim/solver/nlp_search.hpp"
 #include "optim/solver/optimality.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -379,4 +379,4 @@ NlpResult solve_with_nlopt(NonlinearProgram& problem, const VectorXd& x_start, c
   return result;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

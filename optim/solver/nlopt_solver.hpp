@@ -15,7 +15,7 @@
 #include "optim/solver/nlopt_methods.hpp"
 #include "optim/solver/nonlinear_program.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct NloptOptions {
   std::string method = "slsqp";
@@ -35,4 +35,4 @@ struct NloptOptions {
 // evaluation.
 NlpResult solve_with_nlopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const NloptOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

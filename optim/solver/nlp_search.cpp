@@ -6,7 +6,7 @@
 
 #include "optim/solver/optimality.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 double NlpSearch::look(const NlpPoint& point) {
   if (!points_.feasible(point) || !as_good_as_best(point.f)) return std::numeric_limits<double>::infinity();
@@ -51,4 +51,4 @@ void NlpSearch::end_settled(double distance, const std::string& why) {
                           why, held, tolerance_, result_.failures()));
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

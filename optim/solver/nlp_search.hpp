@@ -14,7 +14,7 @@
 #include "optim/solver/evaluated_points.hpp"
 #include "optim/solver/nonlinear_program.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class NlpSearch {
  protected:
@@ -63,4 +63,4 @@ class NlpSearch {
   double distance_ = std::numeric_limits<double>::infinity();  // of the solution
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

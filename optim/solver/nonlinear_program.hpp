@@ -19,7 +19,7 @@
 
 #include "optim/solver/solver_outcome.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The factors of f and c in a solver's tests of convergence.
 struct NlpScale {
@@ -109,4 +109,4 @@ struct NlpResult : SolverOutcome {
   std::string algorithm;  // in the words of the library that it comes from
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

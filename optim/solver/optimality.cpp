@@ -7,7 +7,7 @@
 
 #include "core/linear/dense.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -168,4 +168,4 @@ Conflict conflict(const NonlinearProgram& problem, const VectorXd& x, const NlpP
   return found;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -21,7 +21,7 @@
 
 #include "optim/solver/nonlinear_program.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // point must hold the values and derivatives at x.
 double optimality(const NonlinearProgram& problem, const Eigen::VectorXd& x, const NlpPoint& point);
@@ -52,4 +52,4 @@ Conflict conflict(const NonlinearProgram& problem, const Eigen::VectorXd& x, con
 // min |A z - b| subject to z >= 0.
 Eigen::VectorXd non_negative_least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::VectorXd;
 
@@ -15,4 +15,4 @@ void ResidualCurvature::add(const VectorXd& s, const VectorXd& y, const VectorXd
   S_ += (r * y.transpose() + y * r.transpose()) / rise - r.dot(s) / (rise * rise) * y * y.transpose();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

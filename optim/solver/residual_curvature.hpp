@@ -15,7 +15,7 @@
 
 #include <Eigen/Core>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class ResidualCurvature {
  public:
@@ -28,4 +28,4 @@ class ResidualCurvature {
   Eigen::MatrixXd S_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 double usual_scale(LossType type) {
   switch (type) {
@@ -42,4 +42,4 @@ LossValue Loss::at(double z_squared) const {
   return {x, 1, 0};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

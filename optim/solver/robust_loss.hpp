@@ -15,7 +15,7 @@
 
 #include <optional>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 enum class LossType { squared, huber, cauchy, tukey };
 
@@ -33,4 +33,4 @@ struct Loss {
   LossValue at(double z_squared) const;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

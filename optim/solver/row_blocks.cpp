@@ -9,7 +9,7 @@
 
 #include "core/linear/dense.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -170,4 +170,4 @@ RowBlocks RowBlocks::scaled_and_damped(const VectorXd& D, double lambda) const {
   return {std::move(blocks), columns_};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -16,7 +16,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct RowBlock {
   std::vector<Eigen::Index> columns;
@@ -49,4 +49,4 @@ class RowBlocks {
   std::vector<std::vector<std::size_t>> places_;  // per column: the blocks with it
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

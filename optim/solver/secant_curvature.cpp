@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 void SecantCurvature::add(const Eigen::VectorXd& x, const Eigen::VectorXd& f_x) {
   if (!iterates_.empty() && iterates_.back().x == x) return;
@@ -39,4 +39,4 @@ SecantCurvature::Pair SecantCurvature::pair(std::size_t k) const {
   return {iterates_[k].x - iterates_[k - 1].x, iterates_[k].f_x - iterates_[k - 1].f_x};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

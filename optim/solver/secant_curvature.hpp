@@ -18,7 +18,7 @@
 #include <cstddef>
 #include <deque>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class SecantCurvature {
  public:
@@ -44,4 +44,4 @@ class SecantCurvature {
   std::deque<Iterate> iterates_;  // oldest first
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -6,7 +6,7 @@
 
 #include "core/expression/counted.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 std::string_view to_string(SolverStatus status) {
   constexpr std::string_view kNames[] = {
@@ -36,4 +36,4 @@ void SolverOutcome::refuse_start(const std::string& why) {
   end(SolverStatus::failed, "the start point cannot be evaluated: " + why);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // searched: a global method has used up its budget, which is its only end. converged_beyond_limit: limits hold for
 // smooth extremes, but not for the true ones.
@@ -39,4 +39,4 @@ struct SolverOutcome {
   void refuse_start(const std::string& why);
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

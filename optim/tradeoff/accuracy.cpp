@@ -14,7 +14,7 @@
 #include "core/watch/stiffness.hpp"
 #include "optim/tradeoff/tradeoff_reference.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Counts independent closed chains: joints between bodies that other joints connect already. The ground is a body here.
@@ -264,4 +264,4 @@ std::string accuracy_in_words(double accuracy) {
   return fmt::format("{:.0e}", accuracy);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

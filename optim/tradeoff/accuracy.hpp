@@ -21,7 +21,7 @@
 
 #include "optim/tradeoff/tradeoff_errors.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The properties of the scene that the choice uses.
 struct SceneFeatures {
@@ -66,4 +66,4 @@ AccuracyChoice choose_accuracy(const Scene& scene, const std::vector<Objective>&
 // "engineering (1e-05)", "2e-04"
 std::string accuracy_in_words(double accuracy);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities) {
   std::vector<std::size_t> found;
@@ -138,4 +138,4 @@ Recommendation TaskAdviser::at(double accuracy) {
   return advice;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

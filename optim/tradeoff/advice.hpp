@@ -20,7 +20,7 @@
 #include "optim/tradeoff/fit_errors.hpp"
 #include "optim/tradeoff/tradeoff_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct Recommendation {
   std::vector<std::size_t> quantities;  // indices; all of them within the accuracy
@@ -67,4 +67,4 @@ class TaskAdviser {
   std::map<std::size_t, FitErrors::Error> measured_;  // by row
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -9,7 +9,7 @@
 #include "optim/problem/parameter_values.hpp"
 #include "optim/tradeoff/tradeoff_reference.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 
@@ -90,4 +90,4 @@ FitErrors::Error FitErrors::at(const SimulationSettings& settings) const {
   return found.message.empty() ? apart(found, right_) : Error{found.message};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -17,7 +17,7 @@
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 class FitErrors {
  public:
@@ -56,4 +56,4 @@ class FitErrors {
   Error certificate_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

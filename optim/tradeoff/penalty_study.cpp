@@ -10,7 +10,7 @@
 
 #include "core/dynamics/spatial_dynamics.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
@@ -160,4 +160,4 @@ std::vector<double> alphas_of(const std::string& text) {
   return alphas;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

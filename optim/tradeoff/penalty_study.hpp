@@ -17,7 +17,7 @@
 
 #include "optim/tradeoff/tradeoff_measurement.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct PenaltyStudyRow {
   double alpha = 0;
@@ -40,4 +40,4 @@ PenaltyStudy study_penalty(const Scene& scene, const std::vector<Objective>& obj
 // "1e2:1e16" means all powers of ten in this range, "1e5,3e7" these two. Throws std::invalid_argument.
 std::vector<double> alphas_of(const std::string& text);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

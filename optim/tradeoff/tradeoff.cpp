@@ -10,7 +10,7 @@
 #include "core/cvodes/cvodes.hpp"
 #include "core/tableau/tableaus.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Settings from loose to tight, and the number of those measured.
@@ -208,4 +208,4 @@ Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& obje
   return Sweep(scene, objectives, options).run();
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

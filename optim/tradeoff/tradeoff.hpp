@@ -14,9 +14,9 @@
 
 #include "optim/tradeoff/tradeoff_measurement.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,
                           const TradeoffOptions& options = {});
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

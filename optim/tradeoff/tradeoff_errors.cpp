@@ -6,7 +6,7 @@
 
 #include "optim/problem/parameter_values.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 using Eigen::Index;
 
@@ -99,4 +99,4 @@ Eigen::VectorXd TradeoffErrors::each(Measure measure, const Answer& answer, cons
   return values;
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

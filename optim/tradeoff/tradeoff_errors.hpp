@@ -19,7 +19,7 @@
 
 #include "optim/tradeoff/tradeoff_runs.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();  // an error that is not there
 
@@ -75,4 +75,4 @@ class TradeoffErrors {
   std::vector<Quantity> quantities_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

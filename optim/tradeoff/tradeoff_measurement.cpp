@@ -4,7 +4,7 @@
 
 #include "optim/machine/median.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 TradeoffMeasurement::TradeoffMeasurement(const Scene& scene, const std::vector<Objective>& objectives,
                                          const TradeoffOptions& options)
@@ -78,4 +78,4 @@ Tradeoff TradeoffMeasurement::finish() {
   return std::move(result_);
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

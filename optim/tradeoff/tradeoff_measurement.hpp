@@ -9,7 +9,7 @@
 
 #include "optim/tradeoff/tradeoff_table.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct TradeoffOptions {
   double budget_seconds = 60;  // 0: the reference, the scene's own settings and the defaults only
@@ -44,4 +44,4 @@ class TradeoffMeasurement {
   Answer timed(const TradeoffSetting& setting, double seconds) const;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -10,7 +10,7 @@
 
 #include "core/scene/default_integrator.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -330,4 +330,4 @@ FormulationSettings constrained(const FormulationSettings& formulation) {
   return as_it_is ? formulation : FormulationSettings{};
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -15,7 +15,7 @@
 
 #include "optim/tradeoff/tradeoff_errors.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct ReferenceMethod {
   std::string integrator;
@@ -58,4 +58,4 @@ SimulationSettings with_defaults(SimulationSettings settings);
 // The constrained equations: the scene's own formulation if it is an augmented Lagrangian with full projection.
 FormulationSettings constrained(const FormulationSettings& formulation);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -6,7 +6,7 @@
 
 #include "optim/objective/objective_run.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 std::vector<bool> no_derivatives(const Scene& scene) { return std::vector<bool>(scene.parameters.size(), false); }
@@ -111,4 +111,4 @@ Answer TradeoffRuns::gradients(const SimulationSettings& settings, GradientMetho
   });
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

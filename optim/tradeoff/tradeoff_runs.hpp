@@ -16,7 +16,7 @@
 #include "optim/objective/evaluator.hpp"
 #include "optim/objective/sampled_motion.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 struct Answer {
   bool ok = false;
@@ -70,4 +70,4 @@ class TradeoffRuns {
   Mechanism mechanism_;
 };
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -8,7 +8,7 @@
 #include <map>
 #include <utility>
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 namespace {
 
 // Returns the rows that cost less than every tighter one, in the same order. `some` goes from loose to tight.
@@ -105,4 +105,4 @@ std::vector<std::size_t> slower_and_slower(const std::vector<TradeoffRow>& rows,
   return not_dominated(some, [&](std::size_t i) { return rows[i].wall_seconds; });
 }
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim

@@ -19,7 +19,7 @@
 
 #include "optim/tradeoff/tradeoff_reference.hpp"
 
-namespace mbsopt {
+namespace mbsopt::inline optim {
 
 // The curves of settings that stand alone.
 inline constexpr const char *kOwnSettings = "as in the file", *kDefaults = "defaults";
@@ -99,4 +99,4 @@ std::vector<WorkPrecisionCurve> work_precision_curves(const std::vector<Tradeoff
 // tight. Times depend on the machine and on chance; a line's right-hand sides do not.
 std::vector<std::size_t> slower_and_slower(const std::vector<TradeoffRow>& rows, const std::vector<std::size_t>& some);
 
-}  // namespace mbsopt
+}  // namespace mbsopt::inline optim
