@@ -52,7 +52,7 @@ double seconds_of_run(const Linkage& linkage, const std::string& model) {
     SimulationResult result;
     const ThreadClock clock;
     run.run(
-        y, angles, [](double) { return false; }, [](const Step&) {}, {}, result);
+        y, angles, [](double) { return false; }, {}, {}, result);
     seconds.push_back(clock.seconds() / static_cast<double>(result.statistics.rhs_evaluations));
   }
   return median(std::move(seconds));

@@ -39,8 +39,7 @@ ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& set
   }
 }
 
-void ForwardRun::go(std::span<const double> observed,
-                    const std::function<void(std::size_t, const StatePoint&)>& observe, const RunOptions& options,
+void ForwardRun::go(std::span<const double> observed, const Observe& observe, const RunOptions& options,
                     const Follow& follow) {
   if (!result_.ok()) return;
   SampleSchedule schedule(costs_, observed, settings_.end_time);
@@ -53,38 +52,31 @@ void ForwardRun::go(std::span<const double> observed,
     jumps.emplace(mechanism_, settings_, costs_, motion());
     jumps->begin({settings_.start_time, assembly_.result().y, assembly_.result().angles, motion()});
   }
-  std::string objection;  // to running costs, to derivatives
-  auto accepted = [&](const Step& step) {
-    const std::span<const SampleEvent> events = schedule.take(step.t1);
-    add_running_costs(step, y, options.frozen ? nullptr : &watch, objection);
-    if (jumps) jumps->look_at({step.t1, step.y1, step.angles1, motion()});
-    for (const SampleEvent& e : events) {
-      if (!e.cost && !observe) continue;
-      dense_output(method_, step, (e.time - step.t) / step.h, y);
-      const StatePoint at{e.time, y, step.angles0, motion()};
-      if (e.cost) {
-        result_.psi(e.objective) += e.cost->value(at);
-      } else {
-        observe(e.index, at);
-      }
-    }
-    if (!follow) return;
-    if (!follow(step, events)) followed = false;
-    if (objection.empty()) {
-      objection = through_zero_length(mechanism_.data(), step.t, step.y0, step.t1, step.y1);
-    }
-  };
-  RunOptions until_objection = options;
-  until_objection.progress = [&](double t) { return objection.empty() && (!options.progress || options.progress(t)); };
+  std::span<const SampleEvent> events;
+  std::vector<StepObserver> observers;
+  observers.push_back([&](const Step& step) {
+    events = schedule.take(step.t1);
+    return add_running_costs(step, y, options.frozen ? nullptr : &watch);
+  });
+  if (jumps)
+    observers.push_back([&](const Step& step) {
+      jumps->look_at({step.t1, step.y1, step.angles1, motion()});
+      return std::string();
+    });
+  observers.push_back([&](const Step& step) {
+    sample(step, events, observe, y);
+    return std::string();
+  });
+  if (follow)
+    observers.push_back([&](const Step& step) {
+      followed = follow(step, events) && followed;
+      return through_zero_length(mechanism_.data(), step.t, step.y0, step.t1, step.y1);
+    });
   run.run(
-      assembly_.result().y, assembly_.result().angles, [&](double t1) { return schedule.due(t1); }, accepted,
-      until_objection, result_);
+      assembly_.result().y, assembly_.result().angles, [&](double t1) { return schedule.due(t1); }, observers, options,
+      result_);
   watch.add_to(result_.statistics);
   if (jumps) jumps->add_to(result_.statistics);
-  if (!objection.empty()) {
-    result_.status = SimulationStatus::not_credible;
-    result_.message = objection;
-  }
   angles_end_ = run.angles();
   if (result_.ok() && !followed) {
     result_.status = SimulationStatus::not_finite;
@@ -109,8 +101,7 @@ void ForwardRun::add_terminal_costs() {
 }
 
 // Each node's state is copied once for all costs. watch: none where steps are given.
-void ForwardRun::add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch,
-                                   std::string& objection) {
+std::string ForwardRun::add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch) {
   const std::size_t nodes = static_cast<std::size_t>(method_.nodes);
   g_.assign(nodes * costs_.size(), 0.0);
   for (int i = 0; i < method_.nodes; ++i) {
@@ -126,8 +117,23 @@ void ForwardRun::add_running_costs(const Step& step, Eigen::VectorXd& y, Quadrat
       result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.node_b[i] * g_[k];
     }
   }
+  std::string objection;
   for (std::size_t o = 0; watch && objection.empty() && o < costs_.size(); ++o)
     if (costs_[o].running) objection = watch->look_at(step, o, std::span(g_).subspan(o * nodes, nodes));
+  return objection;
+}
+
+void ForwardRun::sample(const Step& step, std::span<const SampleEvent> events, const Observe& observe,
+                        Eigen::VectorXd& y) {
+  for (const SampleEvent& e : events) {
+    if (!e.cost && !observe) continue;
+    dense_output(method_, step, (e.time - step.t) / step.h, y);
+    const StatePoint at{e.time, y, step.angles0, motion()};
+    if (e.cost)
+      result_.psi(e.objective) += e.cost->value(at);
+    else
+      observe(e.index, at);
+  }
 }
 
 }  // namespace mbsopt

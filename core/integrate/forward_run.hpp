@@ -27,13 +27,14 @@ class ForwardRun {
   // False where a factorisation failed.
   using Follow = std::function<bool(const Step&, std::span<const SampleEvent>)>;
 
+  using Observe = std::function<void(std::size_t, const StatePoint&)>;
+
   // Throws std::invalid_argument where settings name no Runge-Kutta method, or one that lacks a step.
   ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
              Assembly assembly);
 
   // observed: times [s] at which `observe` sees the state. `follow` may be empty.
-  void go(std::span<const double> observed, const std::function<void(std::size_t, const StatePoint&)>& observe,
-          const RunOptions& options, const Follow& follow);
+  void go(std::span<const double> observed, const Observe& observe, const RunOptions& options, const Follow& follow);
 
   const Method& method() const { return method_; }
   const Assembly& assembly() const { return assembly_; }
@@ -42,7 +43,8 @@ class ForwardRun {
   SimulationResult finish() { return std::move(result_); }
 
  private:
-  void add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch, std::string& objection);
+  std::string add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch);
+  void sample(const Step& step, std::span<const SampleEvent> events, const Observe& observe, Eigen::VectorXd& y);
   void add_terminal_costs();
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 

@@ -12,6 +12,10 @@ constexpr long kStretch = 256;  // steps at once: their list is copied
 bool Replayer::replay(const Snapshot& from, long last, const std::function<bool()>& dense,
                       const std::function<void(const Step&)>& sink, const std::function<bool()>& go_on) {
   if (!run_) run_.emplace(mechanism_, settings_, method_);
+  const StepObserver observer = [&](const Step& step) {
+    sink(step);
+    return std::string();
+  };
   Snapshot at = from;
   while (at.step < last) {
     if (!go_on()) return false;
@@ -24,7 +28,7 @@ bool Replayer::replay(const Snapshot& from, long last, const std::function<bool(
     RunOptions options;
     options.frozen = &part;
     run_->run(
-        at.y0, at.angles, [&](double) { return dense(); }, sink, options, result);
+        at.y0, at.angles, [&](double) { return dense(); }, {&observer, 1}, options, result);
     factorisations_ = result.statistics.factorisations;  // of all calls so far
     if (!result.ok()) return false;
     at = {next, result.y_end, run_->angles()};

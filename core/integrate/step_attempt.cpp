@@ -15,47 +15,51 @@ namespace mbsopt {
 
 StepAttempt::StepAttempt(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
                          const ComponentTolerances& tolerances)
-    : dynamics(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
-      step(make_step(mechanism, method, projector->solution())),
+    : dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
+      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
+      step_(make_step(mechanism, method, projector_->solution())),
       data_(mechanism.data()),
       rk_(method),
       tolerances_(tolerances) {
   const Eigen::Index states = mechanism.states();
   for (Eigen::VectorXd* x : {&work_, &ydot_, &y_stage_}) x->setZero(states);
   const bool constrained = settings.formulation.type == FormulationType::augmented_lagrangian && closes_loops(data_);
-  if (constrained && !rk_.implicit() && projector->positions()) {
+  if (constrained && !rk_.implicit() && projector_->positions()) {
     const bool planar = model_of(mechanism, settings, method) == Model::planar;
     response_.setZero(planar ? static_cast<Eigen::Index>(data_.planar->rows.size()) : data_.m);
-    passage.emplace(rk_, response_.size());
+    passage_.emplace(rk_, response_.size());
     no_parameters_ = block_without_parameters(data_);
     for (LaneRows* x : {&error_, &projected_error_}) x->setZero(states, kLanes);
   }
   if (rk_.gamma) {
-    rosenbrock_.emplace(mechanism, rk_, dynamics);
+    rosenbrock_.emplace(mechanism, rk_, dynamics_);
   } else if (rk_.implicit()) {
-    implicit_.emplace(mechanism, rk_, settings.integrator, dynamics.in_space());
+    implicit_.emplace(mechanism, rk_, settings.integrator, dynamics_.in_space());
   }
+}
+
+void StepAttempt::start_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  step_.t = t, step_.y0 = y, step_.angles0 = angles;
 }
 
 bool StepAttempt::begin() {
   evaluations_ = 0;
   first_stage_known_ = false;
-  if (!dynamics.evaluate(step.t, step.y0, step.angles0, ydot_)) return false;
-  if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics.lambda());
+  if (!dynamics_.evaluate(step_.t, step_.y0, step_.angles0, ydot_)) return false;
+  if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
   return true;
 }
 
 double StepAttempt::first_step(const IntegratorSettings& s, double span) {
   if (s.initial_step) return std::min(*s.initial_step, span);
-  const Eigen::VectorXd& y0 = step.y0;
-  if (!dynamics.evaluate(step.t, y0, step.angles0, ydot_)) return 1e-6 * span;
+  const Eigen::VectorXd& y0 = step_.y0;
+  if (!dynamics_.evaluate(step_.t, y0, step_.angles0, ydot_)) return 1e-6 * span;
   ++evaluations_;
   const double d0 = scaled_norm(y0, y0, y0, tolerances_), d1 = scaled_norm(ydot_, y0, y0, tolerances_);
   const double h0 = std::min(d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1, span);
   work_ = ydot_;
   y_stage_ = y0 + h0 * ydot_;
-  if (!dynamics.evaluate(step.t + h0, y_stage_, step.angles0, ydot_)) return 1e-3 * h0;
+  if (!dynamics_.evaluate(step_.t + h0, y_stage_, step_.angles0, ydot_)) return 1e-3 * h0;
   ++evaluations_;
   work_ -= ydot_;
   const double d2 = scaled_norm(work_, y0, y0, tolerances_) / h0;
@@ -66,25 +70,25 @@ double StepAttempt::first_step(const IntegratorSettings& s, double span) {
 
 bool StepAttempt::evaluate_stage(int i) {
   StageSum sum;
-  for (int j = 0; j < i; ++j) sum.add(step.h * rk_.a(i, j), step.K.col(j).data());
-  sum.to(step.y0.data(), y_stage_.data(), y_stage_.size());
-  step.Y.col(i) = y_stage_;
+  for (int j = 0; j < i; ++j) sum.add(step_.h * rk_.a(i, j), step_.K.col(j).data());
+  sum.to(step_.y0.data(), y_stage_.data(), y_stage_.size());
+  step_.Y.col(i) = y_stage_;
   ++evaluations_;
-  if (!dynamics.evaluate(step.t + rk_.c[i] * step.h, y_stage_, step.angles0, step.K.col(i))) return false;
-  step.lambda.col(i) = dynamics.lambda();
+  if (!dynamics_.evaluate(step_.t + rk_.c[i] * step_.h, y_stage_, step_.angles0, step_.K.col(i))) return false;
+  step_.lambda.col(i) = dynamics_.lambda();
   return true;
 }
 
 // All stages but those of dense output.
 bool StepAttempt::solve_stages(ImplicitStages::Goal goal) {
   if (rosenbrock_) {
-    first_stage_known_ = first_stage_known_ || rosenbrock_->begin(step);
-    return first_stage_known_ && rosenbrock_->solve(step);
+    first_stage_known_ = first_stage_known_ || rosenbrock_->begin(step_);
+    return first_stage_known_ && rosenbrock_->solve(step_);
   }
   if (implicit_) implicit_->new_attempt();
   for (const StageGroup& g : rk_.stage_groups_of_step()) {
     if (is_implicit(rk_, g)) {
-      if (!implicit_->solve(step, g, goal)) return false;
+      if (!implicit_->solve(step_, g, goal)) return false;
     } else if (g.first > 0 || !first_stage_known_) {
       if (!evaluate_stage(g.first)) return false;
       first_stage_known_ = true;  // at this start, whatever h
@@ -97,10 +101,10 @@ double StepAttempt::error_of_step() {
   auto norm = [&](const double* weights) {
     work_.setZero();
     StageSum sum;
-    for (int i = 0; i < rk_.stages; ++i) sum.add(step.h * weights[i], step.K.col(i).data());
+    for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * weights[i], step_.K.col(i).data());
     sum.to(work_.data(), work_.data(), work_.size());
-    if (rk_.error_filter != 0 && !implicit_->filter(step, work_)) return double(INFINITY);
-    return scaled_norm(work_, step.y0, step.y_hat, tolerances_);
+    if (rk_.error_filter != 0 && !implicit_->filter(step_, work_)) return double(INFINITY);
+    return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_);
   };
   const double high = norm(rk_.error);
   return rk_.error_low ? combined_error(high, norm(rk_.error_low)) : high;
@@ -109,35 +113,35 @@ double StepAttempt::error_of_step() {
 // The error after projection. Next to a singular position most of the error is magnified rounding. The constraints hold
 // again in its directions at the end of the step.
 double StepAttempt::error_after_projection() {
-  const double t1 = step.t + step.h;
-  if (!projector->project(t1, step.angles0, step.y_hat, step.y1, step.projection)) return INFINITY;
-  if (!projector->linearise(t1, step.angles0, step.y_hat, step.y1, step.projection)) return INFINITY;
+  const double t1 = step_.t + step_.h;
+  if (!projector_->project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
+  if (!projector_->linearise(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
   const double* weights[2] = {rk_.error, rk_.error_low};
   for (int k = 0; k < 2; ++k) {
     if (!weights[k]) continue;
     work_.setZero();
     StageSum sum;
-    for (int i = 0; i < rk_.stages; ++i) sum.add(step.h * weights[k][i], step.K.col(i).data());
+    for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * weights[k][i], step_.K.col(i).data());
     sum.to(work_.data(), work_.data(), work_.size());
     error_.col(k) = work_;
   }
-  projector->tangent(no_parameters_, error_, projected_error_);
+  projector_->tangent(no_parameters_, error_, projected_error_);
   auto norm = [&](int k) {
     work_ = projected_error_.col(k);
-    return scaled_norm(work_, step.y0, step.y_hat, tolerances_);
+    return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_);
   };
   return rk_.error_low ? combined_error(norm(0), norm(1)) : norm(0);
 }
 
 bool StepAttempt::better_placed_by(double wanted, double largest) {
-  projector->response(response_);
-  if (passage->well_placed(step.t, step.h, wanted, largest, response_)) return false;
-  return std::abs(passage->propose(step.t, wanted, largest) - step.h) > 0.02 * step.h;
+  projector_->response(response_);
+  if (passage_->well_placed(step_.t, step_.h, wanted, largest, response_)) return false;
+  return std::abs(passage_->propose(step_.t, wanted, largest) - step_.h) > 0.02 * step_.h;
 }
 
 StepOutcome StepAttempt::solve(double h, bool adaptive, bool exact, double& error) {
   using Goal = ImplicitStages::Goal;
-  step.h = h;
+  step_.h = h;
   const Goal goal = adaptive ? Goal::tolerance : Goal::rounding;
   bool solved = solve_stages(goal);
   if (!solved && implicit_ && implicit_->stale()) {
@@ -147,12 +151,12 @@ StepOutcome StepAttempt::solve(double h, bool adaptive, bool exact, double& erro
   if (!solved) return implicit_ ? StepOutcome::unsolved : StepOutcome::failed;
   set_y_hat();
   error = 0;
-  if (!adaptive) return step.y_hat.allFinite() ? StepOutcome::accepted : StepOutcome::failed;
+  if (!adaptive) return step_.y_hat.allFinite() ? StepOutcome::accepted : StepOutcome::failed;
   error = error_of_step();
   if (!std::isfinite(error)) return StepOutcome::failed;
-  projected_out = 0;
-  if (error > 1 && passage && passage->near(step.t, h))
-    projected_out = std::exchange(error, std::min(error, error_after_projection()));
+  projected_out_ = 0;
+  if (error > 1 && passage_ && passage_->near(step_.t, h))
+    projected_out_ = std::exchange(error, std::min(error, error_after_projection()));
   if (error > 1) return StepOutcome::rejected;
   if (implicit_ && exact) {
     if (!solve_stages(Goal::polish)) return StepOutcome::unsolved;
@@ -162,53 +166,55 @@ StepOutcome StepAttempt::solve(double h, bool adaptive, bool exact, double& erro
 }
 
 double StepAttempt::change_by(double at, double beside, double duration) {
-  y_stage_ = step.y0 + (at - step.t) / step.h * (step.y_hat - step.y0);
+  y_stage_ = step_.y0 + (at - step_.t) / step_.h * (step_.y_hat - step_.y0);
   evaluations_ += 2;
-  if (!dynamics.evaluate(beside, y_stage_, step.angles0, work_)) return 0;
-  if (!dynamics.evaluate(at, y_stage_, step.angles0, ydot_)) return 0;
+  if (!dynamics_.evaluate(beside, y_stage_, step_.angles0, work_)) return 0;
+  if (!dynamics_.evaluate(at, y_stage_, step_.angles0, ydot_)) return 0;
   work_ = duration * (ydot_ - work_);
-  return scaled_norm(work_, step.y0, step.y_hat, tolerances_);
+  return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_);
 }
 
 void StepAttempt::set_y_hat() {
   StageSum sum;
-  for (int i = 0; i < rk_.stages; ++i) sum.add(step.h * rk_.b[i], step.K.col(i).data());
-  sum.to(step.y0.data(), step.y_hat.data(), step.y_hat.size());
+  for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * rk_.b[i], step_.K.col(i).data());
+  sum.to(step_.y0.data(), step_.y_hat.data(), step_.y_hat.size());
 }
 
-StepOutcome StepAttempt::finish(bool dense) {
-  step.dense = dense;
+StepOutcome StepAttempt::finish(double t1, bool dense) {
+  step_.t1 = t1;
+  step_.dense = dense;
   if (dense) {
     for (int i = rk_.stages; i < rk_.dense_stages; ++i) {
       if (!evaluate_stage(i)) return StepOutcome::failed;
     }
   }
-  if (projector->active()) {
-    if (!projector->project(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) {
+  if (projector_->active()) {
+    if (!projector_->project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) {
       return StepOutcome::off_constraints;
     }
   } else {
-    step.y1 = step.y_hat;
+    step_.y1 = step_.y_hat;
   }
-  step.angles1 = step.angles0;
-  continue_angles(data_, step.y1, step.angles1);
+  step_.angles1 = step_.angles0;
+  continue_angles(data_, step_.y1, step_.angles1);
   return StepOutcome::accepted;
 }
 
 void StepAttempt::accept() {
-  if (implicit_) implicit_->accept(step);
+  if (implicit_) implicit_->accept(step_);
 }
 
-void StepAttempt::advance() {
-  step.y0 = step.y1;
-  step.angles0 = step.angles1;
+void StepAttempt::advance(double t) {
+  step_.t = t;
+  step_.y0 = step_.y1;
+  step_.angles0 = step_.angles1;
   first_stage_known_ = false;
 }
 
 void StepAttempt::restart() {
-  if (!implicit_ || !dynamics.evaluate(step.t, step.y0, step.angles0, ydot_)) return;
+  if (!implicit_ || !dynamics_.evaluate(step_.t, step_.y0, step_.angles0, ydot_)) return;
   ++evaluations_;
-  implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics.lambda());
+  implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
 }
 
 void StepAttempt::add_counts(SimulationStatistics& s) const {
@@ -228,8 +234,8 @@ void StepAttempt::add_counts(SimulationStatistics& s) const {
     s.jacobians += rosenbrock_->jacobians();
     s.factorisations += rosenbrock_->factorisations();
   }
-  s.factor_blocks = dynamics.factor_blocks();
-  s.factorisations += dynamics.factorisations() + projector->factorisations();
+  s.factor_blocks = dynamics_.factor_blocks();
+  s.factorisations += dynamics_.factorisations() + projector_->factorisations();
 }
 
 }  // namespace mbsopt

@@ -2,8 +2,9 @@
 // sizes.
 //
 //   StepAttempt attempt(mechanism, settings, method, tolerances);
-//   attempt.step = start;
-//   if (attempt.solve(h, adaptive, exact, error) == StepOutcome::accepted) attempt.finish(dense);
+//   attempt.start_at(t, y, angles);
+//   if (attempt.begin() && attempt.solve(h, adaptive, exact, error) == StepOutcome::accepted) attempt.finish(t + h,
+//   dense);
 #pragma once
 
 #include <memory>
@@ -29,6 +30,8 @@ class StepAttempt {
   StepAttempt(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
               const ComponentTolerances& tolerances);
 
+  void start_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  void set_time(double t) { step_.t = t; }  // of the start
   // Evaluates the accelerations at the step's start, from which implicit stages begin. False where they do not exist.
   bool begin();
   // A first size from the start. Hairer, Norsett, Wanner I, section II.4, "Starting step size".
@@ -36,7 +39,7 @@ class StepAttempt {
 
   // The stages of a step of size h. error: in tolerances, of an adaptive one. exact: implicit stages to rounding.
   StepOutcome solve(double h, bool adaptive, bool exact, double& error);
-  StepOutcome finish(bool dense);  // dense stages, projection, branches of the angles
+  StepOutcome finish(double t1, bool dense);  // dense stages, projection, branches of the angles
 
   // The change of velocity in tolerances if the accelerations at `at` and `beside` differ for a duration [s].
   double change_by(double at, double beside, double duration);
@@ -44,17 +47,17 @@ class StepAttempt {
   // Returns whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its
   // place.
   bool better_placed_by(double wanted, double largest);
-  void accept();   // the stages of the next step start from this one
-  void advance();  // the start has moved to the step's end
-  void restart();  // accelerations jump at the start: the last step is no start for the iterations of the next
+  void accept();           // the stages of the next step start from this one
+  void advance(double t);  // the start moves to the step's end, whose time becomes t
+  void restart();          // accelerations jump at the start: the last step is no start for the iterations of the next
   bool has_implicit_stages() const { return implicit_.has_value(); }
   void add_counts(SimulationStatistics& statistics) const;
 
-  Dynamics dynamics;
-  std::unique_ptr<Projector> projector;
-  Step step;                               // t, y0 and angles0 are given
-  std::optional<SingularPassage> passage;  // of explicit methods through closed loops
-  double projected_out = 0;                // of the error of the last attempt, in tolerances
+  const Step& step() const { return step_; }
+  Dynamics& dynamics() { return dynamics_; }
+  Projector& projector() { return *projector_; }
+  SingularPassage* passage() { return passage_ ? &*passage_ : nullptr; }  // of explicit methods through closed loops
+  double projected_out() const { return projected_out_; }  // of the error of the last attempt, in tolerances
 
  private:
   bool evaluate_stage(int i);
@@ -63,6 +66,11 @@ class StepAttempt {
   double error_after_projection();
   void set_y_hat();
 
+  Dynamics dynamics_;
+  std::unique_ptr<Projector> projector_;
+  Step step_;
+  std::optional<SingularPassage> passage_;
+  double projected_out_ = 0;
   const MechanismData& data_;
   const Method& rk_;
   const ComponentTolerances& tolerances_;

@@ -113,7 +113,7 @@ TEST_CASE("steps allocate nothing after the first, whatever their number", "[all
     REQUIRE(projector->project(0, p.angles, p.y, y, solution));
     const long before = allocation_count();
     run.run(
-        y, p.angles, [](double) { return true; }, [](const Step&) {}, {}, result);
+        y, p.angles, [](double) { return true; }, {}, {}, result);
     const long count = allocation_count() - before;
     REQUIRE(result.ok());
     return std::pair(count, result.statistics.steps);
@@ -139,7 +139,7 @@ TEST_CASE("steps past singular positions allocate nothing", "[allocation][singul
     result.steps.sizes.reserve(100000);
     const long before = allocation_count();
     run.run(
-        assembly.result().y, VectorXd(), [](double) { return true; }, [](const Step&) {}, {}, result);
+        assembly.result().y, VectorXd(), [](double) { return true; }, {}, {}, result);
     const long count = allocation_count() - before;
     REQUIRE(result.ok());
     return std::pair(count, result.statistics.rejected);
