@@ -4,8 +4,10 @@ the order of its table. Exit code 1 where one does, where files include each oth
 the namespace of its folder, or where a page or a comment names a file that does not exist.
 
     docs/architecture.py              run from anywhere; needs Python 3 alone
+    docs/architecture.py --sample N   100 comments of the sources at random, by the seed N: is each clear alone?
 """
 
+import random
 import re
 import sys
 from collections import defaultdict
@@ -67,7 +69,19 @@ def stale_names():
                 yield f"{page.relative_to(ROOT)} names {path}, which does not exist"
 
 
+def print_comments(seed):
+    comments = []
+    for path in [path for top in ("core", "optim", "app") for path in sorted((ROOT / top).rglob("*.[ch]pp"))]:
+        text = path.read_text()
+        for comment in re.finditer(r"(?:^ *//.*\n)+|^(?!}).*\S +//.*$", text, re.M):
+            line = text.count("\n", 0, comment.start()) + 1
+            comments.append(f"{path.relative_to(ROOT)}:{line}\n{comment.group().rstrip()}\n")
+    print("\n".join(random.Random(seed).sample(comments, 100)))
+
+
 def main():
+    if sys.argv[1:2] == ["--sample"]:
+        return print_comments(int(sys.argv[2]))
     order = folders_in_order()
     text = {path.relative_to(ROOT).as_posix(): path.read_text()
             for top in ("core", "optim", "app") for path in sorted((ROOT / top).rglob("*.[ch]pp"))}

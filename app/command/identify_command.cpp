@@ -91,7 +91,7 @@ void set_units(IdentificationResult& fit, const Problem& problem, const std::vec
 }
 
 // An experiment ends with its data, not with the scene's time.
-std::function<bool(double t)> told(Run& run) {
+std::function<bool(double t)> fit_progress(Run& run) {
   return [&run](double t) {
     run.progress.time("simulating", t);
     return !interrupted();
@@ -101,7 +101,7 @@ std::function<bool(double t)> told(Run& run) {
 // Fits and simulations with these options keep no records.
 IdentificationOptions simulating(Run& run) {
   IdentificationOptions options;
-  options.threads = case_threads(run), options.simulation_progress = told(run);
+  options.threads = case_threads(run), options.simulation_progress = fit_progress(run);
   return options;
 }
 
@@ -113,7 +113,7 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
   IdentificationOptions options;
   options.records = &records, options.threads = case_threads(run);
   options.profiles = run.context.options.profiles;
-  options.simulation_progress = told(run);
+  options.simulation_progress = fit_progress(run);
   options.progress = [&](const FitRow& row) {
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.6e}   gradient {:.1e}   step {:.1e}   {}",
                                        row.iteration, row.cost, row.gradient_norm, row.step_norm,
@@ -138,7 +138,7 @@ Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& 
   RecoveryOptions options;
   options.bootstrap = bootstrap, options.threads = case_threads(run);
   options.seeds = bootstrap ? run.context.options.bootstrap : run.context.options.recover;
-  options.simulation_progress = told(run);
+  options.simulation_progress = fit_progress(run);
   options.progress = [&](int done) {
     run.progress.iteration(fmt::format("{}   {} of {}", name, done, options.seeds));
     return !interrupted();
@@ -221,7 +221,7 @@ SimulatedExperiment simulated_experiment(Run& run, Scene scene) {
   const Mechanism mechanism(motion.scene, parameter_values(motion.scene),
                             std::vector<bool>(motion.scene.parameters.size(), false));
   RunOptions options;
-  options.progress = told(run);
+  options.progress = fit_progress(run);
   Sampling sampling = record_trajectory(mechanism, motion.scene, motion.trajectory);
   JointForces forces(motion.scene, parameter_values(motion.scene), sampling.times.size());
   sampling.observe = [&, record = sampling.observe](std::size_t i, const StatePoint& at) {
@@ -328,7 +328,7 @@ int identify_command(const CommandContext& context) {
   const Mechanism mechanism(first, parameter_values(first));
   run.start();
   if (!settle_accuracy(run, first, {})) return run.finish();
-  const CutProblem cut = cut_into_windows(run.problem, whole, {}, told(run));  // by the settled integrator
+  const CutProblem cut = cut_into_windows(run.problem, whole, {}, fit_progress(run));  // by the settled integrator
   run.progress.finish();
   const std::vector<CsvTable>& data = cut.data;
   if (const Assembly assembly(mechanism, first.simulation.start_time); assembly.result().ok) {

@@ -77,7 +77,7 @@ std::string result_json_text(const Json& parts) {
   for (const char* key : kOrder) {
     if (const auto part = parts.find(key); part != parts.end()) ordered[key] = *part;
   }
-  for (const auto& [key, part] : parts.items()) ordered[key] = part;  // assigns what is there already to itself
+  for (const auto& [key, part] : parts.items()) ordered[key] = part;  // keys without a place, last
   return json_text(ordered, 2) + "\n";
 }
 

@@ -19,17 +19,17 @@ const char* shape_of(Node::Kind kind) { return kind == Node::Kind::array ? "a li
 
 }  // namespace
 
-const Node* FieldReader::get(std::string_view key, const Says& says) {
-  if (says.need == Need::unknown) return nullptr;
+const Node* FieldReader::get(std::string_view key, const FieldInfo& info) {
+  if (info.need == Need::unknown) return nullptr;
   known_.emplace_back(key);
   const Node* const node = node_.find(key);
-  if (!node && says.need == Need::required)
-    missing_.push_back({std::string(key), "is missing; expected: " + std::string(says.description)});
+  if (!node && info.need == Need::required)
+    missing_.push_back({std::string(key), "is missing; expected: " + std::string(info.description)});
   return node;
 }
 
-const Node* FieldReader::get_kind(std::string_view key, const Says& says, Node::Kind kind) {
-  const Node* const node = get(key, says);
+const Node* FieldReader::get_kind(std::string_view key, const FieldInfo& info, Node::Kind kind) {
+  const Node* const node = get(key, info);
   if (!node || node->kind == kind) return node;
   findings_.add(*node, inside(key), std::string("must be ") + shape_of(kind) + ", found " + what_is(*node));
   return nullptr;
@@ -42,7 +42,7 @@ const FieldReader::Missing* FieldReader::missing_like(const std::string& unknown
 }
 
 void FieldReader::report_keys() {
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
   std::string known_here;  // made for the first unknown key, the same for all
   for (std::size_t i = 0; i < node_.keys.size(); ++i) {
     const std::string& key = node_.keys[i];
@@ -53,7 +53,7 @@ void FieldReader::report_keys() {
     std::string message = "unknown key" + did_you_mean(key, known_) + known_here;
     if (missing) {
       message = "unknown key" + did_you_mean(key, {missing->key}) + "; " + missing->key + " " + missing->message;
-      told.push_back(missing->key);
+      reported.push_back(missing->key);
       findings_.add_elsewhere(inside(missing->key));
     }
     if (node_.source == 0 && node_.items[i].source == 0)
@@ -62,7 +62,7 @@ void FieldReader::report_keys() {
       findings_.add_override(inside(key), message);
   }
   for (const auto& [key, message] : missing_)
-    if (std::find(told.begin(), told.end(), key) == told.end()) findings_.add(node_, inside(key), message);
+    if (std::find(reported.begin(), reported.end(), key) == reported.end()) findings_.add(node_, inside(key), message);
 }
 
 bool FieldReader::read_string(const Node& node, const std::string& path, std::string& value) {
@@ -74,46 +74,47 @@ bool FieldReader::read_string(const Node& node, const std::string& path, std::st
   return true;
 }
 
-void FieldReader::text(std::string_view key, std::string& value, const Says& says) {
-  if (const Node* node = get(key, says)) read_string(*node, inside(key), value);
+void FieldReader::text(std::string_view key, std::string& value, const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_string(*node, inside(key), value);
 }
 
-void FieldReader::texts(std::string_view key, std::vector<std::string>& values, const Says& says) {
-  const Node* const node = get(key, says);
+void FieldReader::texts(std::string_view key, std::vector<std::string>& values, const FieldInfo& info) {
+  const Node* const node = get(key, info);
   if (!node) return;
   if (node->kind != Node::Kind::array) {
     read_string(*node, inside(key), values.emplace_back());
     return;
   }
-  if (node->items.empty()) findings_.add(*node, inside(key), "is empty; expected: " + std::string(says.description));
+  if (node->items.empty()) findings_.add(*node, inside(key), "is empty; expected: " + std::string(info.description));
   for (std::size_t i = 0; i < node->items.size(); ++i)
     read_string(node->items[i], child_path(inside(key), i), values.emplace_back());
 }
 
-void FieldReader::reference(std::string_view key, std::string& value, To, const Says& says) {
-  text(key, value, says);
-  const Node* const node = says.need == Need::unknown ? nullptr : node_.find(key);
+void FieldReader::reference(std::string_view key, std::string& value, ElementKind, const FieldInfo& info) {
+  text(key, value, info);
+  const Node* const node = info.need == Need::unknown ? nullptr : node_.find(key);
   if (node && node->kind == Node::Kind::string && node->string.empty())
-    findings_.add(*node, inside(key), "is empty; expected: " + std::string(says.description));
+    findings_.add(*node, inside(key), "is empty; expected: " + std::string(info.description));
 }
 
-void FieldReader::references(std::string_view key, std::vector<std::string>& values, To, const Says& says) {
-  const Node* const node = get_kind(key, says, Node::Kind::array);
+void FieldReader::references(std::string_view key, std::vector<std::string>& values, ElementKind,
+                             const FieldInfo& info) {
+  const Node* const node = get_kind(key, info, Node::Kind::array);
   if (!node) return;
   for (std::size_t i = 0; i < node->items.size(); ++i)
     read_string(node->items[i], child_path(inside(key), i), values.emplace_back());
 }
 
-void FieldReader::word(std::string_view key, std::string& value, const Words& words_allowed, const Says& says) {
-  const Node* const node = get(key, says);
+void FieldReader::word(std::string_view key, std::string& value, const Words& words_allowed, const FieldInfo& info) {
+  const Node* const node = get(key, info);
   if (!node || !read_string(*node, inside(key), value)) return;
   if (!has_word(words_allowed.available, value))
     findings_.add(*node, inside(key), not_among(key, value, words(words_allowed.available), words_allowed.later));
 }
 
 const TypeRow* FieldReader::type(std::string_view key, std::string_view, std::span<const TypeRow> rows,
-                                 const Says& says) {
-  const Node* const node = get(key, {says.description, Need::optional, {}});
+                                 const FieldInfo& info) {
+  const Node* const node = get(key, {info.description, Need::optional, {}});
   if (!node) {
     missing_.push_back({std::string(key), "is missing; available: " + joined(names_of(rows))});
     findings_.add_elsewhere(path_);  // other requirements of the object depend on it
@@ -147,17 +148,17 @@ bool FieldReader::read_expression(const Node& node, const std::string& path, Exp
   }
 }
 
-void FieldReader::number(std::string_view key, Field& value, const Says& says) {
-  if (const Node* node = get(key, says)) read_expression(*node, inside(key), value);
+void FieldReader::number(std::string_view key, Field& value, const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_expression(*node, inside(key), value);
 }
 
-void FieldReader::number(std::string_view key, std::optional<Field>& value, const Says& says) {
-  if (const Node* node = get(key, says)) read_expression(*node, inside(key), value.emplace());
+void FieldReader::number(std::string_view key, std::optional<Field>& value, const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_expression(*node, inside(key), value.emplace());
 }
 
 void FieldReader::time_law(std::string_view key, Expression& value, std::optional<SampledLaw>& samples,
-                           const Says& says) {
-  const Node* const node = get(key, says);
+                           const FieldInfo& info) {
+  const Node* const node = get(key, info);
   if (!node) return;
   if (node->kind == Node::Kind::object)
     read(*node, inside(key), findings_, samples.emplace());
@@ -177,8 +178,8 @@ bool FieldReader::read_vector(const Node& node, const std::string& path, std::ar
   return good;
 }
 
-void FieldReader::vector(std::string_view key, VectorField& value, const Says& says) {
-  if (const Node* node = get(key, says)) read_vector(*node, inside(key), value);
+void FieldReader::vector(std::string_view key, VectorField& value, const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_vector(*node, inside(key), value);
 }
 
 bool FieldReader::read_point(const Node& node, const std::string& path, PointField& value) {
@@ -193,17 +194,18 @@ bool FieldReader::read_point(const Node& node, const std::string& path, PointFie
   return read_vector(node, path, value.emplace<VectorField>());
 }
 
-void FieldReader::point(std::string_view key, PointField& value, std::string_view, const Says& says) {
-  if (const Node* node = get(key, says)) read_point(*node, inside(key), value);
+void FieldReader::point(std::string_view key, PointField& value, std::string_view, const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_point(*node, inside(key), value);
 }
 
-void FieldReader::point(std::string_view key, std::optional<PointField>& value, std::string_view, const Says& says) {
-  if (const Node* node = get(key, says)) read_point(*node, inside(key), value.emplace());
+void FieldReader::point(std::string_view key, std::optional<PointField>& value, std::string_view,
+                        const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_point(*node, inside(key), value.emplace());
 }
 
 void FieldReader::inertia(std::string_view key, InertiaField& tensor, std::optional<ConsistentInertiaField>& consistent,
-                          const Says& says) {
-  const Node* const node = get(key, says);
+                          const FieldInfo& info) {
+  const Node* const node = get(key, info);
   if (!node) return;
   if (node->kind == Node::Kind::object) {
     const Node* const inside_it = node->find("consistent");
@@ -223,8 +225,8 @@ void FieldReader::inertia(std::string_view key, InertiaField& tensor, std::optio
   }
 }
 
-void FieldReader::orientation(std::string_view key, OrientationField& value, const Says& says) {
-  const Node* const node = get(key, says);
+void FieldReader::orientation(std::string_view key, OrientationField& value, const FieldInfo& info) {
+  const Node* const node = get(key, info);
   if (!node) return;
   const bool is_object = node->kind == Node::Kind::object;
   if (node->kind == Node::Kind::array && node->items.size() == 4) {
@@ -240,8 +242,8 @@ void FieldReader::orientation(std::string_view key, OrientationField& value, con
   }
 }
 
-void FieldReader::points(std::string_view key, std::map<std::string, VectorField>& value, const Says& says) {
-  const Node* const node = get_kind(key, says, Node::Kind::object);
+void FieldReader::points(std::string_view key, std::map<std::string, VectorField>& value, const FieldInfo& info) {
+  const Node* const node = get_kind(key, info, Node::Kind::object);
   if (!node) return;
   for (std::size_t i = 0; i < node->keys.size(); ++i)
     read_vector(node->items[i], child_path(inside(key), node->keys[i]), value[node->keys[i]]);
@@ -273,8 +275,8 @@ bool FieldReader::read_plain(const Node& node, const std::string& path, double& 
   return true;
 }
 
-void FieldReader::plain(std::string_view key, double& value, const Range&, const Says& says) {
-  if (const Node* node = get(key, says)) read_plain(*node, inside(key), value, says.dimension);
+void FieldReader::plain(std::string_view key, double& value, const Range&, const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_plain(*node, inside(key), value, info.dimension);
 }
 
 template <class Integer>
@@ -288,16 +290,16 @@ void FieldReader::read_integer(const Node& node, const std::string& path, Intege
   value = static_cast<Integer>(given);
 }
 
-void FieldReader::plain(std::string_view key, int& value, const Range&, const Says& says) {
-  if (const Node* node = get(key, says)) read_integer(*node, inside(key), value);
+void FieldReader::plain(std::string_view key, int& value, const Range&, const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_integer(*node, inside(key), value);
 }
 
-void FieldReader::plain(std::string_view key, long& value, const Range&, const Says& says) {
-  if (const Node* node = get(key, says)) read_integer(*node, inside(key), value);
+void FieldReader::plain(std::string_view key, long& value, const Range&, const FieldInfo& info) {
+  if (const Node* node = get(key, info)) read_integer(*node, inside(key), value);
 }
 
-void FieldReader::plain(std::string_view key, bool& value, const Range&, const Says& says) {
-  const Node* const node = get(key, says);
+void FieldReader::plain(std::string_view key, bool& value, const Range&, const FieldInfo& info) {
+  const Node* const node = get(key, info);
   if (!node) return;
   if (node->kind == Node::Kind::boolean)
     value = node->boolean;
@@ -306,8 +308,8 @@ void FieldReader::plain(std::string_view key, bool& value, const Range&, const S
 }
 
 void FieldReader::level(std::string_view key, std::optional<double>& value, std::span<const Choice<double>> choices,
-                        const Range& range, const Says& says) {
-  const Node* const node = get(key, says);
+                        const Range& range, const FieldInfo& info) {
+  const Node* const node = get(key, info);
   if (!node) return;
   std::vector<std::string> available;
   for (const Choice<double>& choice : choices) {
@@ -322,7 +324,7 @@ void FieldReader::level(std::string_view key, std::optional<double>& value, std:
   if (is_word)
     findings_.add(*node, inside(key), not_among(key, node->string, available) + ", or a number");
   else
-    plain(key, value, range, says);
+    plain(key, value, range, info);
 }
 
 void FieldReader::instead_of(std::string_view key, std::string_view object, const Words& fields) {
@@ -337,24 +339,24 @@ void FieldReader::instead_of(std::string_view key, std::string_view object, cons
                       inside(key), inside(object)));
 }
 
-void FieldReader::numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says) {
-  const Node* const node = get_kind(key, says, Node::Kind::array);
+void FieldReader::numbers(std::string_view key, std::vector<double>& values, const Range&, const FieldInfo& info) {
+  const Node* const node = get_kind(key, info, Node::Kind::array);
   if (!node) return;
   for (std::size_t i = 0; i < node->items.size(); ++i)
-    read_plain(node->items[i], child_path(inside(key), i), values.emplace_back(0.0), says.dimension);
+    read_plain(node->items[i], child_path(inside(key), i), values.emplace_back(0.0), info.dimension);
 }
 
 void FieldReader::tolerance(std::string_view key, double& value, std::optional<KindTolerances>& kinds,
-                            const Says& says) {
+                            const FieldInfo& info) {
   const Node* const node = node_.find(key);
-  if (!node || node->kind != Node::Kind::object) return plain(key, value, kPositive, says);
-  object(key, kinds, says);
+  if (!node || node->kind != Node::Kind::object) return plain(key, value, kPositive, info);
+  object(key, kinds, info);
   if (kinds) value = kinds->smallest();
 }
 
-void FieldReader::values_of(std::string_view key, std::vector<std::pair<std::string, double>>& values, To, const Range&,
-                            const Says& says) {
-  const Node* const node = get_kind(key, says, Node::Kind::object);
+void FieldReader::values_of(std::string_view key, std::vector<std::pair<std::string, double>>& values, ElementKind,
+                            const Range&, const FieldInfo& info) {
+  const Node* const node = get_kind(key, info, Node::Kind::object);
   if (!node) return;
   for (std::size_t i = 0; i < node->keys.size(); ++i) {
     auto& [name, value] = values.emplace_back(node->keys[i], 0.0);
@@ -397,8 +399,8 @@ void FieldReader::read_named(const Node& node, const std::string& path, TermPara
   if (!read_expression(node, path, value.value)) value.value = std::numeric_limits<double>::quiet_NaN();
 }
 
-void FieldReader::version(std::string_view key, int only, const Says& says) {
-  const Node* const node = get(key, says);
+void FieldReader::version(std::string_view key, int only, const FieldInfo& info) {
+  const Node* const node = get(key, info);
   if (node && (node->kind != Node::Kind::number || node->number != only))
     findings_.add(*node, inside(key), "must be " + std::to_string(only) + ", found " + what_is(*node));
 }

@@ -32,90 +32,90 @@ class FieldReader {
     reader.report_keys();
   }
 
-  void name(std::string_view key, std::string& value, const Says& says) { text(key, value, says); }
-  void text(std::string_view key, std::string& value, const Says& says);
-  void texts(std::string_view key, std::vector<std::string>& values, const Says& says);
-  void reference(std::string_view key, std::string& value, To, const Says& says);
-  void references(std::string_view key, std::vector<std::string>& values, To, const Says& says);
-  void reference_or(std::string_view key, std::string& value, To to, const Says& says, auto&& fields) {
+  void name(std::string_view key, std::string& value, const FieldInfo& info) { text(key, value, info); }
+  void text(std::string_view key, std::string& value, const FieldInfo& info);
+  void texts(std::string_view key, std::vector<std::string>& values, const FieldInfo& info);
+  void reference(std::string_view key, std::string& value, ElementKind, const FieldInfo& info);
+  void references(std::string_view key, std::vector<std::string>& values, ElementKind, const FieldInfo& info);
+  void reference_or(std::string_view key, std::string& value, ElementKind to, const FieldInfo& info, auto&& fields) {
     const Node* const node = node_.find(key);
-    if (!node || node->kind != Node::Kind::object) return reference(key, value, to, says);
-    group(key, says, [&](FieldReader& inside) {
-      inside.reference(kObjectiveKey, value, to, {says.description, Need::required});
+    if (!node || node->kind != Node::Kind::object) return reference(key, value, to, info);
+    group(key, info, [&](FieldReader& inside) {
+      inside.reference(kObjectiveKey, value, to, {info.description, Need::required});
       fields(inside);
     });
   }
-  void word(std::string_view key, std::string& value, const Words& words, const Says& says);
+  void word(std::string_view key, std::string& value, const Words& words, const FieldInfo& info);
   template <class T, std::size_t N>
-  void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says);
-  const TypeRow* type(std::string_view key, std::string_view, std::span<const TypeRow> rows, const Says& says);
+  void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const FieldInfo& info);
+  const TypeRow* type(std::string_view key, std::string_view, std::span<const TypeRow> rows, const FieldInfo& info);
 
-  void number(std::string_view key, Field& value, const Says& says);
-  void number(std::string_view key, std::optional<Field>& value, const Says& says);
-  void vector(std::string_view key, VectorField& value, const Says& says);
-  void point(std::string_view key, PointField& value, std::string_view, const Says& says);
-  void point(std::string_view key, std::optional<PointField>& value, std::string_view, const Says& says);
+  void number(std::string_view key, Field& value, const FieldInfo& info);
+  void number(std::string_view key, std::optional<Field>& value, const FieldInfo& info);
+  void vector(std::string_view key, VectorField& value, const FieldInfo& info);
+  void point(std::string_view key, PointField& value, std::string_view, const FieldInfo& info);
+  void point(std::string_view key, std::optional<PointField>& value, std::string_view, const FieldInfo& info);
   void inertia(std::string_view key, InertiaField& tensor, std::optional<ConsistentInertiaField>& consistent,
-               const Says& says);
-  void orientation(std::string_view key, OrientationField& value, const Says& says);
-  void points(std::string_view key, std::map<std::string, VectorField>& value, const Says& says);
-  void law(std::string_view key, std::optional<Expression>& value, Names, const Says& says) {
-    number(key, value, says);
+               const FieldInfo& info);
+  void orientation(std::string_view key, OrientationField& value, const FieldInfo& info);
+  void points(std::string_view key, std::map<std::string, VectorField>& value, const FieldInfo& info);
+  void law(std::string_view key, std::optional<Expression>& value, Scope, const FieldInfo& info) {
+    number(key, value, info);
   }
-  void expression(std::string_view key, Expression& value, Names, const Says& says) { number(key, value, says); }
-  void time_law(std::string_view key, Expression& value, std::optional<SampledLaw>& samples, const Says& says);
-  void laws(std::string_view key, LawVector& value, Names, const Says& says) { vector(key, value, says); }
+  void expression(std::string_view key, Expression& value, Scope, const FieldInfo& info) { number(key, value, info); }
+  void time_law(std::string_view key, Expression& value, std::optional<SampledLaw>& samples, const FieldInfo& info);
+  void laws(std::string_view key, LawVector& value, Scope, const FieldInfo& info) { vector(key, value, info); }
 
-  void plain(std::string_view key, double& value, const Range&, const Says& says);
-  void plain(std::string_view key, int& value, const Range&, const Says& says);
-  void plain(std::string_view key, long& value, const Range&, const Says& says);
-  void plain(std::string_view key, bool& value, const Range&, const Says& says);
+  void plain(std::string_view key, double& value, const Range&, const FieldInfo& info);
+  void plain(std::string_view key, int& value, const Range&, const FieldInfo& info);
+  void plain(std::string_view key, long& value, const Range&, const FieldInfo& info);
+  void plain(std::string_view key, bool& value, const Range&, const FieldInfo& info);
   template <class T>
-  void plain(std::string_view key, std::optional<T>& value, const Range& range, const Says& says) {
+  void plain(std::string_view key, std::optional<T>& value, const Range& range, const FieldInfo& info) {
     T given{};
-    if (!has(key)) return skip(key, says);
-    plain(key, given, range, says);
+    if (!has(key)) return skip(key, info);
+    plain(key, given, range, info);
     value = given;
   }
   template <std::size_t N>
   void level(std::string_view key, std::optional<double>& value, const Choice<double> (&choices)[N], const Range& range,
-             const Says& says) {
-    level(key, value, std::span<const Choice<double>>(choices), range, says);
+             const FieldInfo& info) {
+    level(key, value, std::span<const Choice<double>>(choices), range, info);
   }
   void level(std::string_view key, std::optional<double>& value, std::span<const Choice<double>> choices, const Range&,
-             const Says& says);
+             const FieldInfo& info);
   void instead_of(std::string_view key, std::string_view object, const Words& fields);
-  void numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says);
-  void values_of(std::string_view key, std::vector<std::pair<std::string, double>>& values, To, const Range&,
-                 const Says& says);
-  void tolerance(std::string_view key, double& value, std::optional<KindTolerances>& kinds, const Says& says);
+  void numbers(std::string_view key, std::vector<double>& values, const Range&, const FieldInfo& info);
+  void values_of(std::string_view key, std::vector<std::pair<std::string, double>>& values, ElementKind, const Range&,
+                 const FieldInfo& info);
+  void tolerance(std::string_view key, double& value, std::optional<KindTolerances>& kinds, const FieldInfo& info);
 
   template <class T>
-  void object(std::string_view key, T& value, const Says& says) {
-    if (const Node* node = get(key, says)) read(*node, inside(key), findings_, value);
+  void object(std::string_view key, T& value, const FieldInfo& info) {
+    if (const Node* node = get(key, info)) read(*node, inside(key), findings_, value);
   }
   template <class T>
-  void object(std::string_view key, std::optional<T>& value, const Says& says) {
-    if (const Node* node = get(key, says)) read(*node, inside(key), findings_, value.emplace());
+  void object(std::string_view key, std::optional<T>& value, const FieldInfo& info) {
+    if (const Node* node = get(key, info)) read(*node, inside(key), findings_, value.emplace());
   }
   template <class F>
-  void group(std::string_view key, const Says& says, F&& fields) {
-    const Node* const node = get_kind(key, says, Node::Kind::object);
+  void group(std::string_view key, const FieldInfo& info, F&& fields) {
+    const Node* const node = get_kind(key, info, Node::Kind::object);
     if (!node) return;
     FieldReader reader(*node, inside(key), findings_);
     fields(reader);
     reader.report_keys();
   }
   template <class T>
-  void list(std::string_view key, std::vector<T>& values, const Says& says) {
-    const Node* const node = get_kind(key, says, Node::Kind::array);
+  void list(std::string_view key, std::vector<T>& values, const FieldInfo& info) {
+    const Node* const node = get_kind(key, info, Node::Kind::array);
     if (!node) return;
     for (std::size_t i = 0; i < node->items.size(); ++i)
       read(node->items[i], child_path(inside(key), i), findings_, values.emplace_back());
   }
   template <class T>
-  void named(std::string_view key, std::vector<T>& values, const Says& says) {
-    const Node* const node = get_kind(key, says, Node::Kind::object);
+  void named(std::string_view key, std::vector<T>& values, const FieldInfo& info) {
+    const Node* const node = get_kind(key, info, Node::Kind::object);
     if (!node) return;
     for (std::size_t i = 0; i < node->keys.size(); ++i) {
       T& value = values.emplace_back();
@@ -124,7 +124,7 @@ class FieldReader {
     }
   }
 
-  void version(std::string_view key, int only, const Says& says);
+  void version(std::string_view key, int only, const FieldInfo& info);
   void later(std::string_view key, std::string_view what);
   void misplaced(std::string_view key, std::string_view where);
   void rest_unknown() { rest_unknown_ = true; }
@@ -139,13 +139,13 @@ class FieldReader {
     std::string key, message;
   };
   const Missing* missing_like(const std::string& unknown) const;
-  void skip(std::string_view key, const Says& says) { get(key, says); }
+  void skip(std::string_view key, const FieldInfo& info) { get(key, info); }
   void refuse(std::string_view key, const std::string& message);  // reports a given key
 
   // Returns the value of a key, which is known from now on. If it is absent, it returns nullptr and reports a required
   // one.
-  const Node* get(std::string_view key, const Says& says);
-  const Node* get_kind(std::string_view key, const Says& says, Node::Kind kind);
+  const Node* get(std::string_view key, const FieldInfo& info);
+  const Node* get_kind(std::string_view key, const FieldInfo& info, Node::Kind kind);
 
   template <class T>
   void read_named(const Node& node, const std::string& path, T& value) {
@@ -174,8 +174,8 @@ class FieldReader {
 };
 
 template <class T, std::size_t N>
-void FieldReader::choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
-  const Node* const node = get(key, says);
+void FieldReader::choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const FieldInfo& info) {
+  const Node* const node = get(key, info);
   std::string given;
   if (!node) return;
   const bool has_truth = std::ranges::find(choices, "true", &Choice<T>::word) != std::end(choices);

@@ -66,9 +66,9 @@ void Findings::throw_if_any() const {
   std::vector<Found> sorted = found_;
   std::stable_sort(sorted.begin(), sorted.end(), [](const Found& a, const Found& b) { return a.offset < b.offset; });
   std::vector<Finding> all;
-  std::set<std::string> told;
+  std::set<std::string> known;
   for (Found& found : sorted)
-    if (told.insert(to_string(found.finding)).second) all.push_back(std::move(found.finding));
+    if (known.insert(to_string(found.finding)).second) all.push_back(std::move(found.finding));
   throw InputError(std::move(all));
 }
 

@@ -47,157 +47,160 @@ class SchemaWriter {
     return schema;
   }
 
-  void name(std::string_view key, std::string&, const Says& says) {
-    put(key, says, {{"type", "string"}, {"minLength", 1}});
+  void name(std::string_view key, std::string&, const FieldInfo& info) {
+    put(key, info, {{"type", "string"}, {"minLength", 1}});
   }
-  void text(std::string_view key, std::string& value, const Says& says) {
-    put(key, says, {{"type", "string"}}, value.empty() ? Json() : Json(value));
+  void text(std::string_view key, std::string& value, const FieldInfo& info) {
+    put(key, info, {{"type", "string"}}, value.empty() ? Json() : Json(value));
   }
-  void reference(std::string_view key, std::string& value, To, const Says& says) { text(key, value, says); }
-  void references(std::string_view key, std::vector<std::string>&, To, const Says& says) {
-    put(key, says, {{"type", "array"}, {"items", {{"type", "string"}}}});
+  void reference(std::string_view key, std::string& value, ElementKind, const FieldInfo& info) {
+    text(key, value, info);
   }
-  void reference_or(std::string_view key, std::string& value, To to, const Says& says, auto&& fields) {
+  void references(std::string_view key, std::vector<std::string>&, ElementKind, const FieldInfo& info) {
+    put(key, info, {{"type", "array"}, {"items", {{"type", "string"}}}});
+  }
+  void reference_or(std::string_view key, std::string& value, ElementKind to, const FieldInfo& info, auto&& fields) {
     SchemaWriter form;
-    form.reference(kObjectiveKey, value, to, {says.description, Need::required});
+    form.reference(kObjectiveKey, value, to, {info.description, Need::required});
     fields(form);
-    put(key, says, {{"anyOf", {{{"type", "string"}}, form.object()}}});
+    put(key, info, {{"anyOf", {{{"type", "string"}}, form.object()}}});
   }
   template <class T, std::size_t N>
-  void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
+  void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const FieldInfo& info) {
     Json all = Json::array(), initial;
     for (const Choice<T>& choice : choices) {
       const bool is_truth = choice.word == "true" || choice.word == "false";
       all.push_back(is_truth ? Json(choice.word == "true") : Json(choice.word));
       if (choice.value == value) initial = all.back();
     }
-    put(key, says, {{"enum", all}}, initial);
+    put(key, info, {{"enum", all}}, initial);
   }
-  void word(std::string_view key, std::string& value, const Words& allowed, const Says& says) {
-    put(key, says, {{"enum", words(allowed.available)}}, value.empty() ? Json() : Json(value));
+  void word(std::string_view key, std::string& value, const Words& allowed, const FieldInfo& info) {
+    put(key, info, {{"enum", words(allowed.available)}}, value.empty() ? Json() : Json(value));
   }
-  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> all, const Says& says) {
+  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> all,
+                      const FieldInfo& info) {
     rows = all;
     type_key = key;
     const TypeRow* const row = find_row(all, current);
-    if (row) put(key, {row->description, says.need, {}}, {{"const", row->name}});
+    if (row) put(key, {row->description, info.need, {}}, {{"const", row->name}});
     return row;
   }
 
-  void number(std::string_view key, Field& value, const Says& says) {
-    put(key, says, ref("expression"), default_of(value));
+  void number(std::string_view key, Field& value, const FieldInfo& info) {
+    put(key, info, ref("expression"), default_of(value));
   }
-  void number(std::string_view key, std::optional<Field>&, const Says& says) { put(key, says, ref("expression")); }
-  void vector(std::string_view key, VectorField& value, const Says& says) {
-    put(key, says, ref("vector"), default_of(value));
+  void number(std::string_view key, std::optional<Field>&, const FieldInfo& info) { put(key, info, ref("expression")); }
+  void vector(std::string_view key, VectorField& value, const FieldInfo& info) {
+    put(key, info, ref("vector"), default_of(value));
   }
-  void point(std::string_view key, PointField& value, std::string_view, const Says& says) {
+  void point(std::string_view key, PointField& value, std::string_view, const FieldInfo& info) {
     const std::string* const initial = std::get_if<std::string>(&value);
-    put(key, says, ref("point"), initial ? Json(*initial) : Json());
+    put(key, info, ref("point"), initial ? Json(*initial) : Json());
   }
-  void point(std::string_view key, std::optional<PointField>&, std::string_view, const Says& says) {
-    put(key, says, ref("point"));
+  void point(std::string_view key, std::optional<PointField>&, std::string_view, const FieldInfo& info) {
+    put(key, info, ref("point"));
   }
-  void inertia(std::string_view key, InertiaField&, std::optional<ConsistentInertiaField>&, const Says& says) {
+  void inertia(std::string_view key, InertiaField&, std::optional<ConsistentInertiaField>&, const FieldInfo& info) {
     SchemaWriter form;
     form.put("consistent", {"lengths that give a possible tensor whatever they are", Need::required, {}},
              object_schema<ConsistentInertiaField>());
-    put(key, says, {{"anyOf", {array_of(ref("expression"), 3), object_schema<InertiaField>(), form.object()}}});
+    put(key, info, {{"anyOf", {array_of(ref("expression"), 3), object_schema<InertiaField>(), form.object()}}});
   }
-  void orientation(std::string_view key, OrientationField&, const Says& says) {
-    put(key, says,
+  void orientation(std::string_view key, OrientationField&, const FieldInfo& info) {
+    put(key, info,
         {{"anyOf",
           {array_of(ref("expression"), 4), object_schema<AxisAngleField>(), object_schema<RollPitchYawField>()}}},
         Json::array({1, 0, 0, 0}));
   }
-  void points(std::string_view key, std::map<std::string, VectorField>&, const Says& says) {
-    put(key, says, {{"type", "object"}, {"propertyNames", names_pattern()}, {"additionalProperties", ref("vector")}});
+  void points(std::string_view key, std::map<std::string, VectorField>&, const FieldInfo& info) {
+    put(key, info, {{"type", "object"}, {"propertyNames", names_pattern()}, {"additionalProperties", ref("vector")}});
   }
-  void law(std::string_view key, std::optional<Expression>&, Names, const Says& says) {
-    put(key, says, ref("expression"));
+  void law(std::string_view key, std::optional<Expression>&, Scope, const FieldInfo& info) {
+    put(key, info, ref("expression"));
   }
-  void expression(std::string_view key, Expression& value, Names, const Says& says) {
-    put(key, says, ref("expression"), says.need == Need::required ? Json() : default_of(value));
+  void expression(std::string_view key, Expression& value, Scope, const FieldInfo& info) {
+    put(key, info, ref("expression"), info.need == Need::required ? Json() : default_of(value));
   }
 
-  void time_law(std::string_view key, Expression&, std::optional<SampledLaw>&, const Says& says) {
+  void time_law(std::string_view key, Expression&, std::optional<SampledLaw>&, const FieldInfo& info) {
     SampledLaw called;
     called.function = "f";
     Json samples = object_schema<SampledLaw>(), function = object_schema_of(called);
     samples["properties"].erase("user"), function["properties"]["user"].erase("default");
-    put(key, says, {{"anyOf", {ref("expression"), samples, function}}});
+    put(key, info, {{"anyOf", {ref("expression"), samples, function}}});
   }
-  void texts(std::string_view key, std::vector<std::string>&, const Says& says) {
+  void texts(std::string_view key, std::vector<std::string>&, const FieldInfo& info) {
     const Json text = {{"type", "string"}};
-    put(key, says, {{"anyOf", {text, {{"type", "array"}, {"items", text}, {"minItems", 1}}}}});
+    put(key, info, {{"anyOf", {text, {{"type", "array"}, {"items", text}, {"minItems", 1}}}}});
   }
-  void laws(std::string_view key, LawVector& value, Names, const Says& says) { vector(key, value, says); }
+  void laws(std::string_view key, LawVector& value, Scope, const FieldInfo& info) { vector(key, value, info); }
 
-  void plain(std::string_view key, double& value, const Range& range, const Says& says) {
-    put(key, says, ranged(ref("number"), range), value);
+  void plain(std::string_view key, double& value, const Range& range, const FieldInfo& info) {
+    put(key, info, ranged(ref("number"), range), value);
   }
-  void plain(std::string_view key, std::optional<double>&, const Range& range, const Says& says) {
-    put(key, says, ranged(ref("number"), range));
+  void plain(std::string_view key, std::optional<double>&, const Range& range, const FieldInfo& info) {
+    put(key, info, ranged(ref("number"), range));
   }
-  void plain(std::string_view key, std::optional<long>&, const Range& range, const Says& says) {
-    put(key, says, ranged({{"type", "integer"}}, range));
+  void plain(std::string_view key, std::optional<long>&, const Range& range, const FieldInfo& info) {
+    put(key, info, ranged({{"type", "integer"}}, range));
   }
-  void plain(std::string_view key, int& value, const Range& range, const Says& says) {
-    put(key, says, ranged({{"type", "integer"}}, range), value);
+  void plain(std::string_view key, int& value, const Range& range, const FieldInfo& info) {
+    put(key, info, ranged({{"type", "integer"}}, range), value);
   }
-  void plain(std::string_view key, long& value, const Range& range, const Says& says) {
-    put(key, says, ranged({{"type", "integer"}}, range), value);
+  void plain(std::string_view key, long& value, const Range& range, const FieldInfo& info) {
+    put(key, info, ranged({{"type", "integer"}}, range), value);
   }
-  void plain(std::string_view key, bool& value, const Range&, const Says& says) {
-    put(key, says, {{"type", "boolean"}}, value);
+  void plain(std::string_view key, bool& value, const Range&, const FieldInfo& info) {
+    put(key, info, {{"type", "boolean"}}, value);
   }
   template <std::size_t N>
   void level(std::string_view key, std::optional<double>&, const Choice<double> (&choices)[N], const Range& range,
-             const Says& says) {
+             const FieldInfo& info) {
     Json words = Json::array();
     for (const Choice<double>& choice : choices) words.push_back(choice.word);
-    put(key, says, {{"anyOf", {{{"enum", words}}, ranged(ref("number"), range)}}});
+    put(key, info, {{"anyOf", {{{"enum", words}}, ranged(ref("number"), range)}}});
   }
   void instead_of(std::string_view key, std::string_view object, const Words& fields) {
     Json none = Json::object();
     for (const std::string& field : words(fields.available)) none[field] = false;
     dependent[std::string(key)] = {{"properties", {{std::string(object), {{"properties", none}}}}}};
   }
-  void numbers(std::string_view key, std::vector<double>&, const Range& range, const Says& says) {
-    put(key, says, {{"type", "array"}, {"items", ranged(ref("number"), range)}});
+  void numbers(std::string_view key, std::vector<double>&, const Range& range, const FieldInfo& info) {
+    put(key, info, {{"type", "array"}, {"items", ranged(ref("number"), range)}});
   }
-  void values_of(std::string_view key, std::vector<std::pair<std::string, double>>&, To, const Range& range,
-                 const Says& says) {
-    put(key, says, {{"type", "object"}, {"additionalProperties", ranged(ref("number"), range)}});
+  void values_of(std::string_view key, std::vector<std::pair<std::string, double>>&, ElementKind, const Range& range,
+                 const FieldInfo& info) {
+    put(key, info, {{"type", "object"}, {"additionalProperties", ranged(ref("number"), range)}});
   }
-  void tolerance(std::string_view key, double& value, std::optional<KindTolerances>&, const Says& says) {
-    put(key, says, {{"anyOf", {ranged(ref("number"), kPositive), object_schema<KindTolerances>()}}}, value);
+  void tolerance(std::string_view key, double& value, std::optional<KindTolerances>&, const FieldInfo& info) {
+    put(key, info, {{"anyOf", {ranged(ref("number"), kPositive), object_schema<KindTolerances>()}}}, value);
   }
 
   template <class T>
-  void object(std::string_view key, T&, const Says& says) {
-    put(key, says, object_schema<T>());
+  void object(std::string_view key, T&, const FieldInfo& info) {
+    put(key, info, object_schema<T>());
   }
   template <class T>
-  void object(std::string_view key, std::optional<T>&, const Says& says) {
-    put(key, says, object_schema<T>());
+  void object(std::string_view key, std::optional<T>&, const FieldInfo& info) {
+    put(key, info, object_schema<T>());
   }
   template <class F>
-  void group(std::string_view key, const Says& says, F&& fields) {
+  void group(std::string_view key, const FieldInfo& info, F&& fields) {
     SchemaWriter inside;
     fields(inside);
-    put(key, says, inside.object());
+    put(key, info, inside.object());
   }
   template <class T>
-  void list(std::string_view key, std::vector<T>&, const Says& says) {
-    put(key, says, {{"type", "array"}, {"items", object_schema<T>()}});
+  void list(std::string_view key, std::vector<T>&, const FieldInfo& info) {
+    put(key, info, {{"type", "array"}, {"items", object_schema<T>()}});
   }
   template <class T>
-  void named(std::string_view key, std::vector<T>&, const Says& says) {
-    put(key, says,
+  void named(std::string_view key, std::vector<T>&, const FieldInfo& info) {
+    put(key, info,
         {{"type", "object"}, {"propertyNames", names_pattern()}, {"additionalProperties", named_schema<T>()}});
   }
-  void version(std::string_view key, int only, const Says& says) { put(key, says, {{"const", only}}); }
+  void version(std::string_view key, int only, const FieldInfo& info) { put(key, info, {{"const", only}}); }
   void later(std::string_view, std::string_view) {}
   void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
@@ -218,10 +221,10 @@ class SchemaWriter {
       return object_schema<T>();
   }
 
-  void put(std::string_view key, const Says& says, Json schema, const Json& initial = {}) {
-    if (says.need == Need::unknown) return;
-    schema["description"] = says.description;
-    if (says.need == Need::required)
+  void put(std::string_view key, const FieldInfo& info, Json schema, const Json& initial = {}) {
+    if (info.need == Need::unknown) return;
+    schema["description"] = info.description;
+    if (info.need == Need::required)
       required.push_back(key);
     else if (!initial.is_null())
       schema["default"] = initial;

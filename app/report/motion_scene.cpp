@@ -26,7 +26,7 @@ std::string point_json(const SketchPoint& p, const char* end = "") {
                      vector_of(p.s));
 }
 
-// Keeps one of several rows, and the last.
+// Every second, third, ... row, so that at most `most` are left, and the last one.
 Trajectory thinned(const Trajectory& all, std::size_t most) {
   Trajectory kept{all.columns, {}};
   const std::size_t stride = (all.rows.size() + most - 1) / most;

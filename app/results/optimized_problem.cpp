@@ -41,33 +41,34 @@ class SettingsWriter {
  public:
   Json json = Json::object();
 
-  void plain(std::string_view key, const auto& value, const Range&, const Says&) { put(key, value); }
+  void plain(std::string_view key, const auto& value, const Range&, const FieldInfo&) { put(key, value); }
   template <class T>
-  void plain(std::string_view key, const std::optional<T>& value, const Range&, const Says&) {
+  void plain(std::string_view key, const std::optional<T>& value, const Range&, const FieldInfo&) {
     if (value) put(key, *value);
   }
-  void word(std::string_view key, const std::string& value, const Words&, const Says&) {
+  void word(std::string_view key, const std::string& value, const Words&, const FieldInfo&) {
     if (!value.empty()) put(key, value);
   }
-  void choice(std::string_view key, const auto& value, const auto& choices, const Says&) {
+  void choice(std::string_view key, const auto& value, const auto& choices, const FieldInfo&) {
     for (const auto& choice : choices)
       if (choice.value == value) put(key, choice.word);
   }
   // The kinds have the same scale as the smallest tolerance.
-  void tolerance(std::string_view key, double smallest, const std::optional<KindTolerances>& given, const Says& says) {
+  void tolerance(std::string_view key, double smallest, const std::optional<KindTolerances>& given,
+                 const FieldInfo& info) {
     if (!given) return put(key, smallest);
     KindTolerances kinds = *given;
     const double scale = smallest / kinds.smallest();
     for (std::optional<double>* const kind : {&kinds.position, &kinds.angle, &kinds.velocity, &kinds.rate})
       if (*kind) **kind *= scale;
     for (auto& [body, value] : kinds.bodies) value *= scale;
-    object(key, std::as_const(kinds), says);
+    object(key, std::as_const(kinds), info);
   }
-  void values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, To, const Range&,
-                 const Says&) {
+  void values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, ElementKind,
+                 const Range&, const FieldInfo&) {
     for (const auto& [name, value] : values) json[std::string(key)][name] = value;
   }
-  void object(std::string_view key, const auto& settings, const Says&) {
+  void object(std::string_view key, const auto& settings, const FieldInfo&) {
     SettingsWriter inside;
     describe(inside, settings);
     if (!inside.json.empty()) put(key, inside.json);

@@ -96,8 +96,8 @@ nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, con
 
 Json machine_json() {
   double load = 0;
-  const bool told = getloadavg(&load, 1) == 1;
-  return {{"cpu", cpu_model()}, {"cores", std::thread::hardware_concurrency()}, {"load", told ? Json(load) : Json()}};
+  const bool known = getloadavg(&load, 1) == 1;
+  return {{"cpu", cpu_model()}, {"cores", std::thread::hardware_concurrency()}, {"load", known ? Json(load) : Json()}};
 }
 
 std::string machine_name(const Json& machine) {

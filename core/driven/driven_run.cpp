@@ -24,8 +24,8 @@ constexpr double kFewestPanels = 4;
 constexpr double kStepsPerPanel = 8;
 // A stretch of a panel that takes so many steps of the path is too long: the speed in it grows without bound.
 constexpr long kMostStepsOfStretch = 32 * static_cast<long>(kStepsPerPanel);
-// Two ends of a path are the same if they differ by less than this part of the rest of the run. `shortest_` is far
-// less.
+// Two ends of a path are the same if they differ by less than this part of the rest of the run, which is far more than
+// the shortest panel.
 constexpr double kSameEnd = 1e-6;
 // A running cost is evaluated at instants at most this part of the run apart, and at most max_step. A peak of this
 // width meets one of them. The nodes of eight panels are that near.

@@ -22,11 +22,11 @@ void GradientQuadrature::take(std::size_t cost, int node, double weight, VecIn y
 }
 
 void GradientQuadrature::end_step(const Step& step) {
-  using Of = QuadratureWatch::Of;
+  using Integrand = QuadratureWatch::Integrand;
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     if (!costs_[o].running) continue;
-    watch_.look_at(step, o, std::span(along_motion_).subspan(o * nodes_, nodes_), Of::along_motion);
-    watch_.look_at(step, o, std::span(along_parameters_).subspan(o * nodes_, nodes_), Of::along_parameters);
+    watch_.look_at(step, o, std::span(along_motion_).subspan(o * nodes_, nodes_), Integrand::along_motion);
+    watch_.look_at(step, o, std::span(along_parameters_).subspan(o * nodes_, nodes_), Integrand::along_parameters);
   }
 }
 

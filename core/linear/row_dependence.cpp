@@ -119,6 +119,20 @@ class Front {
   std::vector<Index> found_;
 };
 
+// Rows of body k, with its columns first, then those of the bodies that are eliminated later.
+Front front_of(const std::vector<Row>& rows, int k, const std::vector<Elimination::Entry>& later, int width,
+               double threshold) {
+  Front front(rows.size(), width * (1 + static_cast<Index>(later.size())), threshold);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (const Part& part : rows[i].parts) {
+      const auto other = std::ranges::lower_bound(later, part.position, {}, &Elimination::Entry::row);
+      const Index column = part.position == k ? 0 : width * (1 + (other - later.begin()));
+      front.rows().row(static_cast<Index>(i)).segment(column, width) = part.x;
+    }
+  }
+  return front;
+}
+
 // All bodies at once, without a part to divide by.
 RowDependence dense_row_dependence(int bodies, int width, const std::vector<Row>& rows, double threshold) {
   const Index columns = static_cast<Index>(width) * bodies;
@@ -151,24 +165,13 @@ RowDependence row_dependence(int rows, int bodies, int width, std::span<const Sp
     std::sort(here.begin(), here.end(), [](const Row& a, const Row& b) { return a.number < b.number; });
     const std::vector<Elimination::Entry>& others = order.columns[at(k)];
     const Index passed_on = width * static_cast<Index>(others.size());
-    Front front(here.size(), width + passed_on, threshold);
-    for (std::size_t i = 0; i < here.size(); ++i) {
-      for (const Part& part : here[i].parts) {
-        const auto other = std::lower_bound(others.begin(), others.end(), part.position,
-                                            [](const Elimination::Entry& e, int wanted) { return e.row < wanted; });
-        const Index column = part.position == k ? 0 : width * (1 + (other - others.begin()));
-        front.rows().row(static_cast<Index>(i)).segment(column, width) = part.x;
-      }
-    }
+    Front front = front_of(here, k, others, width, threshold);
     const std::vector<bool> is_pivot = front.pivots(0, width);
     for (const int column : front.unreached(0, width)) result.unreached.push_back({order.order[at(k)], column});
     std::vector<Index> rest;
     for (std::size_t i = 0; i < here.size(); ++i) {
-      if (is_pivot[i]) {
-        result.independent[at(here[i].number)] = true;
-      } else if (passed_on > 0) {
-        rest.push_back(static_cast<Index>(i));
-      }
+      result.independent[at(here[i].number)] = is_pivot[i];
+      if (!is_pivot[i] && passed_on > 0) rest.push_back(static_cast<Index>(i));
     }
     Front next(rest.size(), passed_on, threshold);
     for (std::size_t i = 0; i < rest.size(); ++i)

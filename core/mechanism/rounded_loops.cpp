@@ -45,7 +45,7 @@ class Loops {
     direction_ = VectorXd::Zero(6 * d_.n);
   }
 
-  // Finds x, unless the numbers have all digits.
+  // Finds the correction x of the numbers that closes the loops, unless they have all digits.
   Outcome search() {
     constexpr int kBatches = 8, kBatch = 6;
     std::vector<Position> all(1);

@@ -28,8 +28,8 @@ class RowLaws {
   void add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* mu1, const Eigen::VectorXd* mu2, double scale,
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar);
   // Adds weight times the gradient of f, or of f_t, of one row in the active parameters. A row without a law has none.
-  enum class Of { f, f_t };
-  void add_gradient(Of what, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
+  enum class Derivative { f, f_t };
+  void add_gradient(Derivative what, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
   // Subtracts the tangents of f, f_t and f_tt, up to the number of outputs.
   void subtract_tangents(const ParameterBlock& block, std::initializer_list<LaneRows*> out);
 

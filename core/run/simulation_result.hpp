@@ -27,8 +27,8 @@ struct QuadratureError {
 
 // A law, component of a force or running cost that jumps at an instant which parameters move (jump_watch.hpp).
 struct Jump {
-  enum class Of { force, drive, objective };  // of a drive: its law's second derivative
-  Of of = Of::force;
+  enum class Owner { force, drive, objective };  // of a drive: its law's second derivative
+  Owner of = Owner::force;
   int index = 0;                // of the force or drive in the scene
   std::string objective;        // its name
   double size = 0, t = 0;       // [unit of the law, s]

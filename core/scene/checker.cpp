@@ -29,21 +29,21 @@ struct Kind {
   const char* one;
   const char* all;
 };
-Kind kind_of(To what) {
+Kind kind_of(ElementKind what) {
   switch (what) {
-    case To::body:
+    case ElementKind::body:
       return {"body", "bodies"};
-    case To::joint:
+    case ElementKind::joint:
       return {"joint", "joints"};
-    case To::drive:
+    case ElementKind::drive:
       return {"drive", "drives"};
-    case To::force:
+    case ElementKind::force:
       return {"force", "forces"};
-    case To::sensor:
+    case ElementKind::sensor:
       return {"sensor", "sensors"};
-    case To::parameter:
+    case ElementKind::parameter:
       return {"parameter", "parameters"};
-    case To::objective:
+    case ElementKind::objective:
       return {"objective", "objectives"};
   }
   return {"", ""};
@@ -70,7 +70,7 @@ std::size_t unreadable_character(std::string_view text) {
 
 std::string text_of(double value) { return std::isnan(value) ? "not a number" : Expression(value).text(); }
 
-void Checker::name(std::string_view key, const std::string& value, const Says&) {
+void Checker::name(std::string_view key, const std::string& value, const FieldInfo&) {
   if (value.empty()) return issue(path(key), "is empty, a name is expected");
   must_be_readable(path(key), value);
   if (value.find_first_of(".,;\"'[]/\\") != std::string::npos)
@@ -96,7 +96,7 @@ void Checker::must_be_identifier(const std::string& where, const std::string& na
     issue(where, "the name '" + name + "' is that of a function");
 }
 
-void Checker::check_reference(const std::string& where, const std::string& value, To what) {
+void Checker::check_reference(const std::string& where, const std::string& value, ElementKind what) {
   if (facts_.has(what, value)) return;
   const auto [one, all] = kind_of(what);
   const std::string text = std::string("there is no ") + one + " '" + value + "'";
@@ -105,15 +105,16 @@ void Checker::check_reference(const std::string& where, const std::string& value
   issue(where, text + did_you_mean(value, names) + listed(all, names));
 }
 
-void Checker::reference(std::string_view key, const std::string& value, To what, const Says& says) {
-  if (says.need == Need::unknown || (value.empty() && says.need == Need::optional)) return;
-  if (value.empty()) return issue(path(key), "is missing; expected: " + std::string(says.description));
+void Checker::reference(std::string_view key, const std::string& value, ElementKind what, const FieldInfo& info) {
+  if (info.need == Need::unknown || (value.empty() && info.need == Need::optional)) return;
+  if (value.empty()) return issue(path(key), "is missing; expected: " + std::string(info.description));
   if (!facts_.has(what, value)) check_reference(path(key), value, what);
 }
 
-void Checker::references(std::string_view key, const std::vector<std::string>& values, To what, const Says& says) {
-  if (values.empty() && says.need == Need::required)
-    issue(path(key), "is empty; expected: " + std::string(says.description));
+void Checker::references(std::string_view key, const std::vector<std::string>& values, ElementKind what,
+                         const FieldInfo& info) {
+  if (values.empty() && info.need == Need::required)
+    issue(path(key), "is empty; expected: " + std::string(info.description));
   std::set<std::string> listed_before;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const std::string where = child_path(path(key), i);
@@ -122,22 +123,22 @@ void Checker::references(std::string_view key, const std::vector<std::string>& v
   }
 }
 
-void Checker::word(std::string_view key, const std::string& value, const Words& allowed, const Says& says) {
-  if (says.need == Need::unknown) return;
-  if (value.empty() && says.need == Need::required)
+void Checker::word(std::string_view key, const std::string& value, const Words& allowed, const FieldInfo& info) {
+  if (info.need == Need::unknown) return;
+  if (value.empty() && info.need == Need::required)
     issue(path(key), "is missing; available: " + joined(words(allowed.available)));
   else if (!value.empty() && !has_word(allowed.available, value))
     issue(path(key), not_among(key, value, words(allowed.available), allowed.later));
 }
 
 const TypeRow* Checker::type(std::string_view key, std::string_view current, std::span<const TypeRow> rows,
-                             const Says&) {
+                             const FieldInfo&) {
   const TypeRow* const row = find_row(rows, current);
   if (!row) issue(path(key), not_among(key, current, names_of(rows)));
   return row;
 }
 
-bool Checker::names_are_known(const std::string& where, const Expression& value, Names names) {
+bool Checker::names_are_known(const std::string& where, const Expression& value, Scope names) {
   const Symbols& symbols = facts_.symbols(names);
   bool known = true;
   for (const std::string& name : value.names()) {
@@ -162,11 +163,11 @@ bool Checker::names_are_known(const std::string& where, const Expression& value,
   return known;
 }
 
-void Checker::check_dimension(const std::string& where, const Expression& value, Names names,
+void Checker::check_dimension(const std::string& where, const Expression& value, Scope names,
                               const std::optional<Dimension>& expected) {
   try {
     const auto found = infer_dimension(value, [&](const std::string& name) {
-      return names == Names::sensor ? facts_.dimension_in_sensor(name) : facts_.dimension_of_name(name);
+      return names == Scope::sensor ? facts_.dimension_in_sensor(name) : facts_.dimension_of_name(name);
     });
     if (expected && !fits(found, *expected))
       issue(where,
@@ -179,11 +180,11 @@ void Checker::check_dimension(const std::string& where, const Expression& value,
 
 // Asks for the unit of an angle of more than a turn, or of a rate that is a round number in degrees: a multiple of an
 // eighth of a turn. Multiples of 50 are round in radians, too. Who writes pi or a unit means radians.
-void Checker::ask_for_degrees(const std::string& where, const Expression& value, Names names,
+void Checker::ask_for_degrees(const std::string& where, const Expression& value, Scope names,
                               const Dimension& expected) {
-  const bool is_law = names == Names::time_law;
+  const bool is_law = names == Scope::time_law;
   const bool is_angle = expected == dimension::kAngle, is_rate = expected == dimension::kRate;
-  if (!(is_angle || is_rate) || !(is_law || names == Names::none)) return;
+  if (!(is_angle || is_rate) || !(is_law || names == Scope::none)) return;
   const auto law = is_law ? facts_.law_at(value, facts_.scene().simulation.start_time) : std::nullopt;
   const double x = is_law ? 0 : facts_.value(value).value_or(0);
   const double angle = law ? (*law)[0] : is_angle ? x : 0, rate = law ? (*law)[1] : is_rate ? x : 0;
@@ -198,12 +199,12 @@ void Checker::ask_for_degrees(const std::string& where, const Expression& value,
                      text_of(is_large ? angle : rate) + " [" + degrees + "]\" or \"[" + unit + "]\"");
 }
 
-void Checker::check_expression(const std::string& where, const Expression& value, Names names,
+void Checker::check_expression(const std::string& where, const Expression& value, Scope names,
                                const std::optional<Dimension>& expected) {
   if (!names_are_known(where, value, names)) return;
-  if (names == Names::state) check_sensors_of_state(where, value);
-  if (names != Names::objective) check_dimension(where, value, names, expected);
-  if (value.is_number() || names == Names::none) {
+  if (names == Scope::state) check_sensors_of_state(where, value);
+  if (names != Scope::objective) check_dimension(where, value, names, expected);
+  if (value.is_number() || names == Scope::none) {
     check_size(where, value);
   }
 }
@@ -229,32 +230,32 @@ void Checker::check_sensors_of_state(const std::string& where, const Expression&
   }
 }
 
-void Checker::laws(std::string_view key, const LawVector& values, Names names, const Says& says) {
+void Checker::laws(std::string_view key, const LawVector& values, Scope names, const FieldInfo& info) {
   for (std::size_t i = 0; i < values.size(); ++i)
-    check_expression(child_path(path(key), i), values[i], names, says.dimension);
+    check_expression(child_path(path(key), i), values[i], names, info.dimension);
 }
 
-void Checker::number(std::string_view key, const Field& value, const Says& says) {
-  if (says.need != Need::unknown) check_expression(path(key), value, Names::none, says.dimension);
+void Checker::number(std::string_view key, const Field& value, const FieldInfo& info) {
+  if (info.need != Need::unknown) check_expression(path(key), value, Scope::none, info.dimension);
 }
 
-void Checker::number(std::string_view key, const std::optional<Field>& value, const Says& says) {
-  if (value) number(key, *value, says);
+void Checker::number(std::string_view key, const std::optional<Field>& value, const FieldInfo& info) {
+  if (value) number(key, *value, info);
 }
 
 void Checker::check_vector(const std::string& where, const VectorField& value,
                            const std::optional<Dimension>& expected) {
   for (std::size_t i = 0; i < value.size(); ++i)
-    check_expression(child_path(where, i), value[i], Names::none, expected);
+    check_expression(child_path(where, i), value[i], Scope::none, expected);
 }
 
-void Checker::vector(std::string_view key, const VectorField& value, const Says& says) {
-  check_vector(path(key), value, says.dimension);
+void Checker::vector(std::string_view key, const VectorField& value, const FieldInfo& info) {
+  check_vector(path(key), value, info.dimension);
 }
 
-void Checker::point(std::string_view key, const PointField& value, const std::string& body, const Says& says) {
-  if (says.need == Need::unknown) return;
-  if (const auto* vector = std::get_if<VectorField>(&value)) return check_vector(path(key), *vector, says.dimension);
+void Checker::point(std::string_view key, const PointField& value, const std::string& body, const FieldInfo& info) {
+  if (info.need == Need::unknown) return;
+  if (const auto* vector = std::get_if<VectorField>(&value)) return check_vector(path(key), *vector, info.dimension);
   const std::string& name = std::get<std::string>(value);
   if (name == "O") return;
   const Body* const owner = facts_.body(body);
@@ -269,20 +270,20 @@ void Checker::point(std::string_view key, const PointField& value, const std::st
 }
 
 void Checker::point(std::string_view key, const std::optional<PointField>& value, const std::string& body,
-                    const Says& says) {
-  if (value && says.need == Need::unknown)
+                    const FieldInfo& info) {
+  if (value && info.need == Need::unknown)
     issue(path(key), "is given, and this type does not have it");
   else if (value)
-    point(key, *value, body, says);
-  else if (says.need == Need::required)
-    issue(path(key), "is missing; expected: " + std::string(says.description));
+    point(key, *value, body, info);
+  else if (info.need == Need::required)
+    issue(path(key), "is missing; expected: " + std::string(info.description));
 }
 
-void Checker::orientation(std::string_view key, const OrientationField& value, const Says&) {
+void Checker::orientation(std::string_view key, const OrientationField& value, const FieldInfo&) {
   Checker inside = at(key);
   if (const auto* e = std::get_if<EulerParametersField>(&value)) {
     for (std::size_t i = 0; i < e->e.size(); ++i)
-      inside.check_expression(child_path(inside.path(), i), e->e[i], Names::none, Dimension{});
+      inside.check_expression(child_path(inside.path(), i), e->e[i], Scope::none, Dimension{});
     check_meaning(inside, *e);
   } else if (const auto* a = std::get_if<AxisAngleField>(&value)) {
     inside.check(*a);
@@ -291,37 +292,37 @@ void Checker::orientation(std::string_view key, const OrientationField& value, c
   }
 }
 
-void Checker::points(std::string_view key, const std::map<std::string, VectorField>& value, const Says& says) {
+void Checker::points(std::string_view key, const std::map<std::string, VectorField>& value, const FieldInfo& info) {
   for (const auto& [name, coordinates] : value) {
     const std::string where = child_path(path(key), name);
     if (is_identifier(name)) must_be_readable(where, name);
     if (!is_identifier(name) || name == "O")
       issue(where, "the name '" + name + "' of a point must be an identifier other than 'O', which is the origin");
-    check_vector(where, coordinates, says.dimension);
+    check_vector(where, coordinates, info.dimension);
   }
 }
 
-void Checker::law(std::string_view key, const std::optional<Expression>& value, Names names, const Says& says) {
-  if (value) expression(key, *value, names, says);
+void Checker::law(std::string_view key, const std::optional<Expression>& value, Scope names, const FieldInfo& info) {
+  if (value) expression(key, *value, names, info);
 }
 
-void Checker::expression(std::string_view key, const Expression& value, Names names, const Says& says) {
-  // Names::none here means parameters_only, where weights without units are usual, as in other objectives.
-  if (names == Names::none && !says.dimension) {
+void Checker::expression(std::string_view key, const Expression& value, Scope names, const FieldInfo& info) {
+  // Scope::none here means parameters_only, where weights without units are usual, as in other objectives.
+  if (names == Scope::none && !info.dimension) {
     if (!names_are_known(path(key), value, names)) return;
     return check_size(path(key), value);
   }
-  check_expression(path(key), value, names, says.dimension);
+  check_expression(path(key), value, names, info.dimension);
 }
 
 void Checker::time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
-                       const Says& says) {
+                       const FieldInfo& info) {
   Checker inside = at(key);
   if (samples) {
     inside.check(*samples);
-    if (says.dimension) check_quantity(inside, *samples, *says.dimension);
+    if (info.dimension) check_quantity(inside, *samples, *info.dimension);
   } else {
-    check_expression(path(key), value, Names::time_law, says.dimension);
+    check_expression(path(key), value, Scope::time_law, info.dimension);
   }
 }
 
@@ -337,25 +338,25 @@ void Checker::check_number(const std::string& at, double value, const Range& ran
                   text_of(range.least));
 }
 
-void Checker::numbers(std::string_view key, const std::vector<double>& values, const Range& range, const Says&) {
+void Checker::numbers(std::string_view key, const std::vector<double>& values, const Range& range, const FieldInfo&) {
   for (std::size_t i = 0; i < values.size(); ++i) check_number(child_path(path(key), i), values[i], range);
 }
 
-void Checker::plain(std::string_view key, double value, const Range& range, const Says&) {
+void Checker::plain(std::string_view key, double value, const Range& range, const FieldInfo&) {
   check_range(key, value, range);
 }
-void Checker::plain(std::string_view key, int value, const Range& range, const Says&) {
+void Checker::plain(std::string_view key, int value, const Range& range, const FieldInfo&) {
   check_range(key, value, range);
 }
-void Checker::plain(std::string_view key, long value, const Range& range, const Says&) {
+void Checker::plain(std::string_view key, long value, const Range& range, const FieldInfo&) {
   check_range(key, static_cast<double>(value), range);
 }
-void Checker::plain(std::string_view key, const std::optional<double>& value, const Range& range, const Says&) {
+void Checker::plain(std::string_view key, const std::optional<double>& value, const Range& range, const FieldInfo&) {
   if (value) check_range(key, *value, range);
 }
 
-void Checker::values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, To what,
-                        const Range& range, const Says&) {
+void Checker::values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values,
+                        ElementKind what, const Range& range, const FieldInfo&) {
   for (const auto& [name, value] : values) {
     check_reference(child_path(path(key), name), name, what);
     at(key).check_range(name, value, range);
@@ -363,8 +364,8 @@ void Checker::values_of(std::string_view key, const std::vector<std::pair<std::s
 }
 
 void Checker::tolerance(std::string_view key, double value, const std::optional<KindTolerances>& kinds,
-                        const Says& says) {
-  if (!kinds) return plain(key, value, kPositive, says);
+                        const FieldInfo& info) {
+  if (!kinds) return plain(key, value, kPositive, info);
   at(key).check(*kinds);
   if (!kinds->position && !kinds->angle && !kinds->velocity && !kinds->rate)
     issue(path(key), "needs at least one of the tolerances position, angle, velocity and rate");

@@ -34,94 +34,98 @@ class Checker {
     check_meaning(*this, value);
   }
 
-  void name(std::string_view key, const std::string& value, const Says& says);
-  void text(std::string_view, const std::string&, const Says&) {}
-  void texts(std::string_view, const std::vector<std::string>&, const Says&) {}
-  void reference(std::string_view key, const std::string& value, To what, const Says& says);
-  void references(std::string_view key, const std::vector<std::string>& values, To what, const Says& says);
-  void reference_or(std::string_view key, const std::string& value, To what, const Says& says, auto&& fields) {
-    reference(key, value, what, says);
+  void name(std::string_view key, const std::string& value, const FieldInfo& info);
+  void text(std::string_view, const std::string&, const FieldInfo&) {}
+  void texts(std::string_view, const std::vector<std::string>&, const FieldInfo&) {}
+  void reference(std::string_view key, const std::string& value, ElementKind what, const FieldInfo& info);
+  void references(std::string_view key, const std::vector<std::string>& values, ElementKind what,
+                  const FieldInfo& info);
+  void reference_or(std::string_view key, const std::string& value, ElementKind what, const FieldInfo& info,
+                    auto&& fields) {
+    reference(key, value, what, info);
     Checker inside = at(key);
     fields(inside);
   }
-  void word(std::string_view key, const std::string& value, const Words& words, const Says& says);
+  void word(std::string_view key, const std::string& value, const Words& words, const FieldInfo& info);
   template <class T, std::size_t N>
-  void choice(std::string_view, const T&, const Choice<T> (&)[N], const Says&) {}
-  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> rows, const Says& says);
+  void choice(std::string_view, const T&, const Choice<T> (&)[N], const FieldInfo&) {}
+  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> rows,
+                      const FieldInfo& info);
 
-  void number(std::string_view key, const Field& value, const Says& says);
-  void number(std::string_view key, const std::optional<Field>& value, const Says& says);
-  void vector(std::string_view key, const VectorField& value, const Says& says);
-  void point(std::string_view key, const PointField& value, const std::string& body, const Says& says);
-  void point(std::string_view key, const std::optional<PointField>& value, const std::string& body, const Says& says);
+  void number(std::string_view key, const Field& value, const FieldInfo& info);
+  void number(std::string_view key, const std::optional<Field>& value, const FieldInfo& info);
+  void vector(std::string_view key, const VectorField& value, const FieldInfo& info);
+  void point(std::string_view key, const PointField& value, const std::string& body, const FieldInfo& info);
+  void point(std::string_view key, const std::optional<PointField>& value, const std::string& body,
+             const FieldInfo& info);
   void inertia(std::string_view key, const InertiaField& tensor,
-               const std::optional<ConsistentInertiaField>& consistent, const Says&) {
+               const std::optional<ConsistentInertiaField>& consistent, const FieldInfo&) {
     if (consistent)
       at(key).at("consistent").check(*consistent);
     else
       at(key).check(tensor);
   }
-  void orientation(std::string_view key, const OrientationField& value, const Says&);
-  void points(std::string_view key, const std::map<std::string, VectorField>& value, const Says& says);
-  void law(std::string_view key, const std::optional<Expression>& value, Names names, const Says& says);
-  void expression(std::string_view key, const Expression& value, Names names, const Says& says);
+  void orientation(std::string_view key, const OrientationField& value, const FieldInfo&);
+  void points(std::string_view key, const std::map<std::string, VectorField>& value, const FieldInfo& info);
+  void law(std::string_view key, const std::optional<Expression>& value, Scope names, const FieldInfo& info);
+  void expression(std::string_view key, const Expression& value, Scope names, const FieldInfo& info);
   void time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
-                const Says& says);
-  void laws(std::string_view key, const LawVector& values, Names names, const Says& says);
+                const FieldInfo& info);
+  void laws(std::string_view key, const LawVector& values, Scope names, const FieldInfo& info);
 
-  void plain(std::string_view key, double value, const Range& range, const Says& says);
-  void plain(std::string_view key, int value, const Range& range, const Says& says);
-  void plain(std::string_view key, long value, const Range& range, const Says& says);
-  void plain(std::string_view, bool, const Range&, const Says&) {}
-  void plain(std::string_view key, const std::optional<double>& value, const Range& range, const Says& says);
-  void plain(std::string_view key, const std::optional<long>& value, const Range& range, const Says& says) {
-    if (value) plain(key, *value, range, says);
+  void plain(std::string_view key, double value, const Range& range, const FieldInfo& info);
+  void plain(std::string_view key, int value, const Range& range, const FieldInfo& info);
+  void plain(std::string_view key, long value, const Range& range, const FieldInfo& info);
+  void plain(std::string_view, bool, const Range&, const FieldInfo&) {}
+  void plain(std::string_view key, const std::optional<double>& value, const Range& range, const FieldInfo& info);
+  void plain(std::string_view key, const std::optional<long>& value, const Range& range, const FieldInfo& info) {
+    if (value) plain(key, *value, range, info);
   }
   template <std::size_t N>
   void level(std::string_view key, const std::optional<double>& value, const Choice<double> (&)[N], const Range& range,
-             const Says& says) {
-    plain(key, value, range, says);
+             const FieldInfo& info) {
+    plain(key, value, range, info);
   }
   void instead_of(std::string_view, std::string_view, const Words&) {}
-  void numbers(std::string_view key, const std::vector<double>& values, const Range& range, const Says& says);
-  void values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, To what,
-                 const Range& range, const Says& says);
-  void tolerance(std::string_view key, double value, const std::optional<KindTolerances>& kinds, const Says& says);
+  void numbers(std::string_view key, const std::vector<double>& values, const Range& range, const FieldInfo& info);
+  void values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, ElementKind what,
+                 const Range& range, const FieldInfo& info);
+  void tolerance(std::string_view key, double value, const std::optional<KindTolerances>& kinds, const FieldInfo& info);
 
   template <class T>
-  void object(std::string_view key, const T& value, const Says&) {
+  void object(std::string_view key, const T& value, const FieldInfo&) {
     at(key).check(value);
   }
   template <class T>
-  void object(std::string_view key, const std::optional<T>& value, const Says&) {
+  void object(std::string_view key, const std::optional<T>& value, const FieldInfo&) {
     if (value) at(key).check(*value);
   }
   template <class F>
-  void group(std::string_view key, const Says&, F&& fields) {
+  void group(std::string_view key, const FieldInfo&, F&& fields) {
     Checker inside = at(key);
     fields(inside);
   }
   template <class T>
-  void list(std::string_view key, const std::vector<T>& values, const Says&) {
+  void list(std::string_view key, const std::vector<T>& values, const FieldInfo&) {
     for (std::size_t i = 0; i < values.size(); ++i) Checker(facts_, issues_, child_path(path(key), i)).check(values[i]);
   }
   template <class T>
-  void named(std::string_view key, const std::vector<T>& values, const Says&) {
+  void named(std::string_view key, const std::vector<T>& values, const FieldInfo&) {
     for (const T& value : values) {
       Checker inside(facts_, issues_, child_path(path(key), value.name));
       if constexpr (std::is_same_v<T, Definition> || std::is_same_v<T, TermParameter>)
-        inside.check_expression(inside.path(), value.value, Names::none, {});
+        inside.check_expression(inside.path(), value.value, Scope::none, {});
       else
         inside.check(value);
     }
   }
-  void version(std::string_view, int, const Says&) {}
+  void version(std::string_view, int, const FieldInfo&) {}
   void later(std::string_view, std::string_view) {}
   void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
   // Checks a field at any path.
-  void check_expression(const std::string& path, const Expression& value, Names names,
+  void check_expression(const std::string& path, const Expression& value, Scope names,
                         const std::optional<Dimension>& expected);
   void check_size(const std::string& where, const Expression& value);
   void must_be_identifier(const std::string& path, const std::string& name);
@@ -129,16 +133,16 @@ class Checker {
 
  private:
   Checker at(std::string_view key) const { return {facts_, issues_, path(key)}; }
-  void check_reference(const std::string& path, const std::string& value, To what);
+  void check_reference(const std::string& path, const std::string& value, ElementKind what);
   void check_range(std::string_view key, double value, const Range& range);
   void check_number(const std::string& at, double value, const Range& range);
   void check_vector(const std::string& path, const VectorField& value, const std::optional<Dimension>& expected);
-  bool names_are_known(const std::string& path, const Expression& value, Names names);
+  bool names_are_known(const std::string& path, const Expression& value, Scope names);
   void check_sensors_of_state(const std::string& path, const Expression& value);
-  void check_dimension(const std::string& path, const Expression& value, Names names,
+  void check_dimension(const std::string& path, const Expression& value, Scope names,
                        const std::optional<Dimension>& expected);
 
-  void ask_for_degrees(const std::string& path, const Expression& value, Names names, const Dimension& expected);
+  void ask_for_degrees(const std::string& path, const Expression& value, Scope names, const Dimension& expected);
 
   const SceneFacts& facts_;
   std::vector<SceneIssue>& issues_;

@@ -19,7 +19,7 @@ struct FieldPlace {
 // on_expression(const FieldPlace&, const Expression&, Names), on_point(const std::string& body, const std::string&
 // name) for points that are used by name, and on_reference(To, const std::string& name). Definitions are left out: they
 // count where they are used.
-template <class OnExpression, class OnPoint, class OnReference = decltype([](To, const std::string&) {})>
+template <class OnExpression, class OnPoint, class OnReference = decltype([](ElementKind, const std::string&) {})>
 class FieldVisitor {
  public:
   FieldVisitor(OnExpression on_expression, OnPoint on_point, OnReference on_reference = {})
@@ -27,113 +27,119 @@ class FieldVisitor {
         on_point_(std::move(on_point)),
         on_reference_(std::move(on_reference)) {}
 
-  void name(std::string_view, const std::string&, const Says&) {}
-  void text(std::string_view, const std::string&, const Says&) {}
-  void texts(std::string_view, const std::vector<std::string>&, const Says&) {}
-  void reference(std::string_view, const std::string& name, To to, const Says& says) {
-    if (says.need != Need::unknown) on_reference_(to, name);
+  void name(std::string_view, const std::string&, const FieldInfo&) {}
+  void text(std::string_view, const std::string&, const FieldInfo&) {}
+  void texts(std::string_view, const std::vector<std::string>&, const FieldInfo&) {}
+  void reference(std::string_view, const std::string& name, ElementKind to, const FieldInfo& info) {
+    if (info.need != Need::unknown) on_reference_(to, name);
   }
-  void references(std::string_view, const std::vector<std::string>& names, To to, const Says&) {
+  void references(std::string_view, const std::vector<std::string>& names, ElementKind to, const FieldInfo&) {
     for (const std::string& name : names) on_reference_(to, name);
   }
-  void reference_or(std::string_view, const std::string&, To, const Says&, auto&&) {}
-  void word(std::string_view, const std::string&, const Words&, const Says&) {}
+  void reference_or(std::string_view, const std::string&, ElementKind, const FieldInfo&, auto&&) {}
+  void word(std::string_view, const std::string&, const Words&, const FieldInfo&) {}
   template <class T, std::size_t N>
-  void choice(std::string_view, const T&, const Choice<T> (&)[N], const Says&) {}
-  const TypeRow* type(std::string_view, std::string_view current, std::span<const TypeRow> rows, const Says&) {
+  void choice(std::string_view, const T&, const Choice<T> (&)[N], const FieldInfo&) {}
+  const TypeRow* type(std::string_view, std::string_view current, std::span<const TypeRow> rows, const FieldInfo&) {
     return find_row(rows, current);
   }
-  void number(std::string_view key, const Field& value, const Says& says) {
-    if (says.need != Need::unknown) tell(at(key), value, Names::none);
+  void number(std::string_view key, const Field& value, const FieldInfo& info) {
+    if (info.need != Need::unknown) tell(at(key), value, Scope::none);
   }
-  void number(std::string_view key, const std::optional<Field>& value, const Says&) {
-    if (value) tell(at(key), *value, Names::none);
+  void number(std::string_view key, const std::optional<Field>& value, const FieldInfo&) {
+    if (value) tell(at(key), *value, Scope::none);
   }
-  void vector(std::string_view key, const VectorField& value, const Says&) { tell_all(at(key), value, Names::none); }
-  void point(std::string_view key, const PointField& value, const std::string& body, const Says& says) {
-    if (says.need == Need::unknown) return;
+  void vector(std::string_view key, const VectorField& value, const FieldInfo&) {
+    tell_all(at(key), value, Scope::none);
+  }
+  void point(std::string_view key, const PointField& value, const std::string& body, const FieldInfo& info) {
+    if (info.need == Need::unknown) return;
     if (const auto* given = std::get_if<VectorField>(&value))
-      tell_all(at(key), *given, Names::none);
+      tell_all(at(key), *given, Scope::none);
     else if (!in_drawing_)
       on_point_(body, std::get<std::string>(value));
   }
-  void point(std::string_view key, const std::optional<PointField>& value, const std::string& body, const Says& says) {
-    if (value) point(key, *value, body, says);
+  void point(std::string_view key, const std::optional<PointField>& value, const std::string& body,
+             const FieldInfo& info) {
+    if (value) point(key, *value, body, info);
   }
   void inertia(std::string_view key, const InertiaField& tensor,
-               const std::optional<ConsistentInertiaField>& consistent, const Says&) {
+               const std::optional<ConsistentInertiaField>& consistent, const FieldInfo&) {
     if (consistent)
       visit(child_path(at(key), "consistent"), *consistent);
     else
       visit(at(key), tensor);
   }
-  void orientation(std::string_view key, const OrientationField& value, const Says&) {
+  void orientation(std::string_view key, const OrientationField& value, const FieldInfo&) {
     if (const auto* e = std::get_if<EulerParametersField>(&value))
-      tell_all(at(key), e->e, Names::none);
+      tell_all(at(key), e->e, Scope::none);
     else if (const auto* a = std::get_if<AxisAngleField>(&value))
       visit(at(key), *a);
     else
       visit(at(key), std::get<RollPitchYawField>(value));
   }
-  void points(std::string_view key, const std::map<std::string, VectorField>& value, const Says&) {
+  void points(std::string_view key, const std::map<std::string, VectorField>& value, const FieldInfo&) {
     in_named_point_ = true;
-    for (const auto& [name, coordinates] : value) tell_all(child_path(at(key), name), coordinates, Names::none);
+    for (const auto& [name, coordinates] : value) tell_all(child_path(at(key), name), coordinates, Scope::none);
     in_named_point_ = false;
   }
-  void law(std::string_view key, const std::optional<Expression>& value, Names names, const Says&) {
+  void law(std::string_view key, const std::optional<Expression>& value, Scope names, const FieldInfo&) {
     if (value) tell(at(key), *value, names);
   }
-  void expression(std::string_view key, const Expression& value, Names names, const Says&) {
+  void expression(std::string_view key, const Expression& value, Scope names, const FieldInfo&) {
     tell(at(key), value, names);
   }
-  void time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples, const Says&) {
-    if (!samples) tell(at(key), value, Names::time_law);
+  void time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
+                const FieldInfo&) {
+    if (!samples) tell(at(key), value, Scope::time_law);
   }
-  void laws(std::string_view key, const LawVector& values, Names names, const Says&) {
+  void laws(std::string_view key, const LawVector& values, Scope names, const FieldInfo&) {
     tell_all(at(key), values, names);
   }
-  void plain(std::string_view, const auto&, const Range&, const Says&) {}
+  void plain(std::string_view, const auto&, const Range&, const FieldInfo&) {}
   template <std::size_t N>
-  void level(std::string_view, const std::optional<double>&, const Choice<double> (&)[N], const Range&, const Says&) {}
+  void level(std::string_view, const std::optional<double>&, const Choice<double> (&)[N], const Range&,
+             const FieldInfo&) {}
   void instead_of(std::string_view, std::string_view, const Words&) {}
-  void numbers(std::string_view, const std::vector<double>&, const Range&, const Says&) {}
-  void values_of(std::string_view, const std::vector<std::pair<std::string, double>>&, To, const Range&, const Says&) {}
-  void tolerance(std::string_view, double, const std::optional<KindTolerances>&, const Says&) {}
+  void numbers(std::string_view, const std::vector<double>&, const Range&, const FieldInfo&) {}
+  void values_of(std::string_view, const std::vector<std::pair<std::string, double>>&, ElementKind, const Range&,
+                 const FieldInfo&) {}
+  void tolerance(std::string_view, double, const std::optional<KindTolerances>&, const FieldInfo&) {}
   template <class T>
-  void object(std::string_view key, const T& value, const Says&) {
+  void object(std::string_view key, const T& value, const FieldInfo&) {
     visit(at(key), value);
   }
   template <class T>
-  void object(std::string_view key, const std::optional<T>& value, const Says&) {
+  void object(std::string_view key, const std::optional<T>& value, const FieldInfo&) {
     if (value) visit(at(key), *value);
   }
-  void group(std::string_view key, const Says&, auto&& fields) {
+  void group(std::string_view key, const FieldInfo&, auto&& fields) {
     below(at(key), [&] { fields(*this); });
   }
   template <class T>
-  void list(std::string_view key, const std::vector<T>& values, const Says&) {
+  void list(std::string_view key, const std::vector<T>& values, const FieldInfo&) {
     in_drawing_ = std::is_same_v<T, Shape>;
     for (std::size_t i = 0; i < values.size(); ++i) visit(child_path(at(key), i), values[i]);
     in_drawing_ = false;
   }
   template <class T>
-  void named(std::string_view key, const std::vector<T>& values, const Says&) {
+  void named(std::string_view key, const std::vector<T>& values, const FieldInfo&) {
     if constexpr (std::is_same_v<T, TermParameter>)
-      for (const T& value : values) tell(child_path(at(key), value.name), value.value, Names::none);
+      for (const T& value : values) tell(child_path(at(key), value.name), value.value, Scope::none);
     else if constexpr (!std::is_same_v<T, Definition>)
       for (const T& value : values) visit(child_path(at(key), value.name), value);
   }
-  void version(std::string_view, int, const Says&) {}
+  void version(std::string_view, int, const FieldInfo&) {}
   void later(std::string_view, std::string_view) {}
   void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
  private:
   std::string at(std::string_view key) const { return child_path(path_, key); }
-  void tell(const std::string& path, const Expression& value, Names names) {
+  void tell(const std::string& path, const Expression& value, Scope names) {
     on_expression_(FieldPlace{path, in_named_point_, in_drawing_}, value, names);
   }
-  void tell_all(const std::string& path, const auto& values, Names names) {
+  void tell_all(const std::string& path, const auto& values, Scope names) {
     for (std::size_t i = 0; i < values.size(); ++i) tell(child_path(path, i), values[i], names);
   }
   void below(std::string path, auto&& tell_fields) {

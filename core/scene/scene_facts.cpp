@@ -150,62 +150,62 @@ const Drive* SceneFacts::drive(const std::string& name) const { return found(dri
 const Force* SceneFacts::force(const std::string& name) const { return found(forces_, name); }
 const Sensor* SceneFacts::sensor(const std::string& name) const { return found(sensors_, name); }
 
-std::vector<std::string> SceneFacts::names(To what) const {
+std::vector<std::string> SceneFacts::names(ElementKind what) const {
   switch (what) {
-    case To::body: {
+    case ElementKind::body: {
       std::vector<std::string> all = names_of(scene_.bodies);
       all.insert(all.begin(), "ground");
       return all;
     }
-    case To::joint:
+    case ElementKind::joint:
       return names_of(scene_.joints);
-    case To::drive:
+    case ElementKind::drive:
       return names_of(scene_.drives);
-    case To::force:
+    case ElementKind::force:
       return names_of(scene_.forces);
-    case To::sensor:
+    case ElementKind::sensor:
       return names_of(scene_.sensors);
-    case To::parameter:
+    case ElementKind::parameter:
       return names_of(scene_.parameters);
-    case To::objective:
+    case ElementKind::objective:
       return objectives_;
   }
   return {};
 }
 
-bool SceneFacts::has(To what, const std::string& name) const {
+bool SceneFacts::has(ElementKind what, const std::string& name) const {
   switch (what) {
-    case To::body:
+    case ElementKind::body:
       return name == "ground" || body(name);
-    case To::joint:
+    case ElementKind::joint:
       return joint(name);
-    case To::drive:
+    case ElementKind::drive:
       return drive(name);
-    case To::force:
+    case ElementKind::force:
       return force(name);
-    case To::sensor:
+    case ElementKind::sensor:
       return sensor(name);
-    case To::parameter:
+    case ElementKind::parameter:
       return none_.input(name) >= 0;
-    case To::objective:
+    case ElementKind::objective:
       return std::find(objectives_.begin(), objectives_.end(), name) != objectives_.end();
   }
   return false;
 }
 
-const Symbols& SceneFacts::symbols(Names names) const {
+const Symbols& SceneFacts::symbols(Scope names) const {
   switch (names) {
-    case Names::none:
+    case Scope::none:
       return none_;
-    case Names::tsda_law:
+    case Scope::tsda_law:
       return tsda_law_;
-    case Names::rsda_law:
+    case Scope::rsda_law:
       return rsda_law_;
-    case Names::time_law:
+    case Scope::time_law:
       return time_law_;
-    case Names::state:
-    case Names::sensor:
-    case Names::objective:
+    case Scope::state:
+    case Scope::sensor:
+    case Scope::objective:
       return objective_;
   }
   return none_;

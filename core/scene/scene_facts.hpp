@@ -30,12 +30,12 @@ class SceneFacts {
   const Drive* drive(const std::string& name) const;
   const Force* force(const std::string& name) const;
   const Sensor* sensor(const std::string& name) const;
-  std::vector<std::string> names(To what) const;  // objectives: those added with add_objectives
-  bool has(To what, const std::string& name) const;
+  std::vector<std::string> names(ElementKind what) const;  // objectives: those added with add_objectives
+  bool has(ElementKind what, const std::string& name) const;
   void add_objectives(std::vector<std::string> names) { objectives_ = std::move(names); }
 
   // Parameters, definitions, and the other names that an expression may use.
-  const Symbols& symbols(Names names) const;
+  const Symbols& symbols(Scope names) const;
 
   // Returns whether a definition or a sensor's expression cannot be evaluated: it is circular, nested too deep, or has
   // unknown names.

@@ -4,7 +4,7 @@
 //
 //   describe(visitor, body);      // visitor.name("name", body.name, ...), visitor.number("mass", body.mass, ...), ...
 //
-// A visitor offers (Says holds description, need and dimension; X may be const):
+// A visitor offers (FieldInfo holds description, need and dimension; X may be const):
 //   name(key, string&, says)                    a name that others refer to
 //   text(key, string&, says)                    any text
 //   reference(key, string&, To, says)           the name of a body, joint, force, sensor, parameter, objective
@@ -50,17 +50,17 @@
 
 namespace mbsopt {
 
-struct Says {
+struct FieldInfo {
   std::string_view description;
   Need need = Need::optional;
   std::optional<Dimension> dimension = {};  // nullopt: any
 };
 
-enum class To { body, joint, drive, force, sensor, parameter, objective };
+enum class ElementKind { body, joint, drive, force, sensor, parameter, objective };
 inline constexpr std::string_view kObjectiveKey = "objective";  // in the object of a reference_or
 
 // Names that an expression may use besides parameters and definitions.
-enum class Names {
+enum class Scope {
   none,
   tsda_law,
   rsda_law,
@@ -186,8 +186,8 @@ void describe(auto& v, Like<Joint> auto& j) {
   v.name("name", j.name, {"name of the joint", Need::required});
   if (!row) return v.rest_unknown();
   const bool has_bodies = need_of(*row, "joint1") == Need::unknown;
-  v.reference("body1", j.body1, To::body, {"first body", has_bodies ? Need::optional : Need::unknown});
-  v.reference("body2", j.body2, To::body, {"second body", has_bodies ? Need::required : Need::unknown});
+  v.reference("body1", j.body1, ElementKind::body, {"first body", has_bodies ? Need::optional : Need::unknown});
+  v.reference("body2", j.body2, ElementKind::body, {"second body", has_bodies ? Need::required : Need::unknown});
   v.point("point1", j.point1, j.body1, {"point of body1 [m]", need_of(*row, "point1"), kLength});
   v.point("point2", j.point2, j.body2, {"point of body2 [m]", need_of(*row, "point2"), kLength});
   v.point("axis1", j.axis1, j.body1, {"direction in body1", need_of(*row, "axis1")});
@@ -197,8 +197,8 @@ void describe(auto& v, Like<Joint> auto& j) {
   v.point("normal2", j.normal2, j.body2,
           {"direction in body2 to which the angle is measured", need_of(*row, "normal2")});
   v.number("length", j.length, {"of the rod [m]", need_of(*row, "length"), kLength});
-  v.reference("joint1", j.joint1, To::joint, {"joint that turns", need_of(*row, "joint1")});
-  v.reference("joint2", j.joint2, To::joint, {"joint that follows", need_of(*row, "joint2")});
+  v.reference("joint1", j.joint1, ElementKind::joint, {"joint that turns", need_of(*row, "joint1")});
+  v.reference("joint2", j.joint2, ElementKind::joint, {"joint that follows", need_of(*row, "joint2")});
   v.number("ratio", j.ratio, {"angle of joint2 per angle of joint1", need_of(*row, "ratio"), Dimension{}});
   v.number("radius", j.radius, {"displacement of joint2 per radian of joint1 [m]", need_of(*row, "radius"), kLength});
   v.number("pitch", j.pitch, {"displacement per turn, right-handed [m]", need_of(*row, "pitch"), kLength});
@@ -220,7 +220,7 @@ void describe(auto& v, Like<SampledLaw> auto& l) {
   v.text("user", l.function,
          {"name of a function of a plug-in or of the program", l.function.empty() ? Need::optional : Need::required});
   if (l.function.empty()) return describe_samples(v, l, "csv");
-  v.law("argument", l.argument, Names::time_law, {"of the function: of t and parameters; t when absent"});
+  v.law("argument", l.argument, Scope::time_law, {"of the function: of t and parameters; t when absent"});
 }
 
 void describe(auto& v, Like<Signal> auto& s) {
@@ -239,12 +239,12 @@ void describe(auto& v, Like<Drive> auto& d) {
     if (row) d.type = row->name;
   v.name("name", d.name, {"name of the drive", Need::required});
   if (!row) return v.rest_unknown();
-  v.reference("body", d.body, To::body, {"body whose coordinate is driven", need_of(*row, "body")});
+  v.reference("body", d.body, ElementKind::body, {"body whose coordinate is driven", need_of(*row, "body")});
   v.word("coordinate", d.coordinate, Words{"x y z e0 e1 e2 e3"},
          {"of the centre of mass [m], or an Euler parameter", need_of(*row, "coordinate")});
-  v.reference("joint", d.joint, To::joint, {"joint that is driven", need_of(*row, "joint")});
-  v.reference("body1", d.body1, To::body, {"body of the first point", need_of(*row, "body1")});
-  v.reference("body2", d.body2, To::body, {"body of the second point", need_of(*row, "body2")});
+  v.reference("joint", d.joint, ElementKind::joint, {"joint that is driven", need_of(*row, "joint")});
+  v.reference("body1", d.body1, ElementKind::body, {"body of the first point", need_of(*row, "body1")});
+  v.reference("body2", d.body2, ElementKind::body, {"body of the second point", need_of(*row, "body2")});
   v.point("point1", d.point1, d.body1, {"first point [m]", need_of(*row, "point1"), kLength});
   v.point("point2", d.point2, d.body2, {"second point [m]", need_of(*row, "point2"), kLength});
   v.time_law("law", d.law, d.samples,
@@ -255,15 +255,15 @@ void describe(auto& v, Like<Drive> auto& d) {
 
 void describe(auto& v, Like<Tsda> auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.reference("body1", f.body1, To::body, {"first body", need_of(row, "body1")});
-  v.reference("body2", f.body2, To::body, {"second body", need_of(row, "body2")});
+  v.reference("body1", f.body1, ElementKind::body, {"first body", need_of(row, "body1")});
+  v.reference("body2", f.body2, ElementKind::body, {"second body", need_of(row, "body2")});
   v.point("point1", f.point1, f.body1, {"point of body1 [m]", need_of(row, "point1"), kLength});
   v.point("point2", f.point2, f.body2, {"point of body2 [m]", need_of(row, "point2"), kLength});
   v.number("stiffness", f.stiffness, {"k [N/m]", need_of(row, "stiffness"), kStiffness});
   v.number("damping", f.damping, {"c [N s/m]", need_of(row, "damping"), kDamping});
   v.number("free_length", f.free_length, {"l0 [m]", need_of(row, "free_length"), kLength});
   v.number("actuator", f.actuator, {"constant tension [N]", need_of(row, "actuator"), kForce});
-  v.law("law", f.law, Names::tsda_law,
+  v.law("law", f.law, Scope::tsda_law,
         {"tension [N] as an expression of l, ldot and t, instead of the coefficients", need_of(row, "law"), kForce});
 }
 
@@ -272,42 +272,43 @@ void describe_torsion(auto& v, auto& f, const TypeRow& row) {
   v.number("stiffness", f.stiffness, {"k [N m/rad]", need_of(row, "stiffness"), kTorque});
   v.number("damping", f.damping, {"c [N m s/rad]", need_of(row, "damping"), kTorsionalDamping});
   v.number("free_angle", f.free_angle, {"angle without torque [rad]", need_of(row, "free_angle"), kAngle});
-  v.law("law", f.law, Names::rsda_law,
+  v.law("law", f.law, Scope::rsda_law,
         {"resisting torque [N m] as an expression of angle, rate and t, instead of the coefficients",
          need_of(row, "law"), kTorque});
 }
 
 void describe(auto& v, Like<Rsda> auto& f, const TypeRow& row) {
-  v.reference("joint", f.joint, To::joint, {"joint on whose angle it acts", need_of(row, "joint")});
+  v.reference("joint", f.joint, ElementKind::joint, {"joint on whose angle it acts", need_of(row, "joint")});
   describe_torsion(v, f, row);
 }
 
 void describe(auto& v, Like<TorsionBar> auto& f, const TypeRow& row) {
-  v.reference("body1", f.body1, To::body, {"first body, in which the axis is fixed", need_of(row, "body1")});
-  v.reference("body2", f.body2, To::body, {"second body", need_of(row, "body2")});
+  v.reference("body1", f.body1, ElementKind::body, {"first body, in which the axis is fixed", need_of(row, "body1")});
+  v.reference("body2", f.body2, ElementKind::body, {"second body", need_of(row, "body2")});
   v.point("axis", f.axis, f.body1, {"axis about which it acts, in the axes of body1", need_of(row, "axis")});
   describe_torsion(v, f, row);
 }
 
 void describe(auto& v, Like<PointForce> auto& f, const TypeRow& row) {
-  v.reference("body", f.body, To::body, {"body it acts on", need_of(row, "body")});
+  v.reference("body", f.body, ElementKind::body, {"body it acts on", need_of(row, "body")});
   v.point("point", f.point, f.body, {"point of the body [m]", need_of(row, "point"), dimension::kLength});
-  v.laws("components", f.components, Names::state,
+  v.laws("components", f.components, Scope::state,
          {"x, y, z [N], expressions of t, parameters and sensors", need_of(row, "components"), dimension::kForce});
   v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", need_of(row, "frame")});
 }
 
 void describe(auto& v, Like<Torque> auto& f, const TypeRow& row) {
-  v.reference("body", f.body, To::body, {"body it acts on", need_of(row, "body")});
-  v.laws("components", f.components, Names::state,
+  v.reference("body", f.body, ElementKind::body, {"body it acts on", need_of(row, "body")});
+  v.laws("components", f.components, Scope::state,
          {"x, y, z [N m], expressions of t, parameters and sensors", need_of(row, "components"), dimension::kTorque});
   v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", need_of(row, "frame")});
 }
 
 void describe(auto& v, Like<BushingSpec> auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.reference("body1", f.body1, To::body, {"first body, whose axes the coefficients refer to", need_of(row, "body1")});
-  v.reference("body2", f.body2, To::body, {"second body", need_of(row, "body2")});
+  v.reference("body1", f.body1, ElementKind::body,
+              {"first body, whose axes the coefficients refer to", need_of(row, "body1")});
+  v.reference("body2", f.body2, ElementKind::body, {"second body", need_of(row, "body2")});
   v.point("point1", f.point1, f.body1, {"point of body1 [m]", need_of(row, "point1"), kLength});
   v.point("point2", f.point2, f.body2, {"point of body2 [m]", need_of(row, "point2"), kLength});
   v.vector("stiffness", f.stiffness, {"along x, y, z of body1 [N/m]", need_of(row, "stiffness"), kStiffness});
@@ -319,7 +320,7 @@ void describe(auto& v, Like<BushingSpec> auto& f, const TypeRow& row) {
 }
 
 void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
-  v.reference("joint", f.joint, To::joint, {"joint it acts in", need_of(row, "joint")});
+  v.reference("joint", f.joint, ElementKind::joint, {"joint it acts in", need_of(row, "joint")});
   v.word("motion", f.motion, Words{"rotation translation"},
          {"about or along the axis; when absent, about it where the joint has an angle", need_of(row, "motion")});
   v.number("coulomb", f.coulomb, {"torque [N m] or force [N] at high rates", need_of(row, "coulomb")});
@@ -335,7 +336,7 @@ void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
 
 void describe(auto& v, Like<UserForceSpec> auto& f, const TypeRow& row) {
   v.text("force", f.force, {"name of a force of a plug-in or of the program", need_of(row, "force")});
-  v.references("bodies", f.bodies, To::body,
+  v.references("bodies", f.bodies, ElementKind::body,
                {"bodies of the force, in its order; when absent those that the force names", need_of(row, "bodies")});
   v.named("parameters", f.parameters,
           {"parameters of the force, each an expression of parameters of the problem", need_of(row, "parameters")});
@@ -350,7 +351,7 @@ void describe(auto& v, Like<Force> auto& f) {
 }
 
 void describe(auto& v, Like<PointOnBody> auto& p) {
-  v.reference("body", p.body, To::body, {"a body", Need::required});
+  v.reference("body", p.body, ElementKind::body, {"a body", Need::required});
   v.point("point", p.point, p.body, {"a point of it [m]", Need::optional, dimension::kLength});
 }
 
@@ -360,23 +361,23 @@ void describe(auto& v, Like<Sensor> auto& s) {
       v.type("quantity", s.quantity, std::span(kSensorQuantities), {"what is measured", Need::required});
   if (!row) return v.rest_unknown();
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(s)>>) s.quantity = row->name;
-  v.reference("body", s.body, To::body, {"body it is on", need_of(*row, "body")});
+  v.reference("body", s.body, ElementKind::body, {"body it is on", need_of(*row, "body")});
   v.point("point", s.point, s.body, {"point of the body [m]", need_of(*row, "point"), kLength});
   if (need_of(*row, "relative_to") != Need::unknown)
     v.object("relative_to", s.relative_to, {"point whose position or velocity is subtracted"});
   v.word("component", s.component, Words{row->components}, {"which component", need_of(*row, "component")});
   v.choice("frame", s.in_body_frame, kFrames, {"axes of the component", need_of(*row, "frame")});
-  v.reference("joint", s.joint, To::joint, {"joint that has it", need_of(*row, "joint")});
-  v.reference("body1", s.body1, To::body, {"body of the first point", need_of(*row, "body1")});
-  v.reference("body2", s.body2, To::body, {"body of the second point", need_of(*row, "body2")});
+  v.reference("joint", s.joint, ElementKind::joint, {"joint that has it", need_of(*row, "joint")});
+  v.reference("body1", s.body1, ElementKind::body, {"body of the first point", need_of(*row, "body1")});
+  v.reference("body2", s.body2, ElementKind::body, {"body of the second point", need_of(*row, "body2")});
   v.point("point1", s.point1, s.body1, {"first point [m]", need_of(*row, "point1"), kLength});
   v.point("point2", s.point2, s.body2, {"second point [m]", need_of(*row, "point2"), kLength});
-  v.reference("force", s.force, To::force, {"a tsda, rsda or torsion_bar", need_of(*row, "force")});
+  v.reference("force", s.force, ElementKind::force, {"a tsda, rsda or torsion_bar", need_of(*row, "force")});
   v.word("kind", s.kind, Words{"force torque"}, {"which reaction", need_of(*row, "kind")});
-  v.reference("drive", s.drive, To::drive, {"a drive", need_of(*row, "drive")});
+  v.reference("drive", s.drive, ElementKind::drive, {"a drive", need_of(*row, "drive")});
   v.point("axis", s.axis, s.body1.empty() ? "ground" : s.body1,
           {"direction in the ground, or in body1", need_of(*row, "axis")});
-  v.expression("value", s.value, Names::sensor,
+  v.expression("value", s.value, Scope::sensor,
                {"expression of t, parameters, definitions and other sensors", need_of(*row, "value")});
   v.orientation(
       "axes", s.axes,
@@ -384,7 +385,7 @@ void describe(auto& v, Like<Sensor> auto& s) {
 }
 
 void describe(auto& v, Like<Condition> auto& c) {
-  v.reference("sensor", c.sensor, To::sensor, {"a sensor", Need::required});
+  v.reference("sensor", c.sensor, ElementKind::sensor, {"a sensor", Need::required});
   v.number("value", c.value, {"its value at the start"});
   v.number("rate", c.rate, {"time derivative of its value at the start"});
   v.number("acceleration", c.acceleration, {"of kinematics: second time derivative of its value"});
@@ -433,7 +434,7 @@ void describe(auto& v, Like<KindTolerances> auto& t) {
   v.plain("velocity", t.velocity, kPositive, {"of velocities [m/s]; when absent the smallest of this object"});
   v.plain("rate", t.rate, kPositive,
           {"of the rates of Euler parameters [1/s]; when absent the smallest of this object"});
-  v.values_of("bodies", t.bodies, To::body, kPositive, {"of all components of a body, by its name"});
+  v.values_of("bodies", t.bodies, ElementKind::body, kPositive, {"of all components of a body, by its name"});
 }
 
 void describe(auto& v, Like<IntegratorSettings> auto& i) {

@@ -155,9 +155,10 @@ Warning missed_pulse(const Scene& scene, const SimulationStatistics& statistics)
 
 std::string in_words(const Scene& scene, const Jump& jump) {
   const std::size_t index = static_cast<std::size_t>(jump.index);
-  const std::string what = jump.of == Jump::Of::force   ? "the law of force '" + scene.forces[index].name + "'"
-                           : jump.of == Jump::Of::drive ? "the acceleration of drive '" + scene.drives[index].name + "'"
-                                                        : "the integrand of objective '" + jump.objective + "'";
+  const std::string what = jump.of == Jump::Owner::force ? "the law of force '" + scene.forces[index].name + "'"
+                           : jump.of == Jump::Owner::drive
+                               ? "the acceleration of drive '" + scene.drives[index].name + "'"
+                               : "the integrand of objective '" + jump.objective + "'";
   std::string causes;
   for (const int k : jump.parameters)
     causes += (causes.empty() ? "'" : ", '") + scene.parameters[static_cast<std::size_t>(k)].name + "'";

@@ -277,7 +277,8 @@ void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, Mat
 }
 
 void AssemblyEquations::add_law_gradients(MatrixXd& rho) const {
-  const RowLaws::Of what = level_ == AssemblyLevel::position ? RowLaws::Of::f : RowLaws::Of::f_t;
+  const RowLaws::Derivative what =
+      level_ == AssemblyLevel::position ? RowLaws::Derivative::f : RowLaws::Derivative::f_t;
   VectorXd rho_bar(data_.rho.size());
   for (const RowLaw& law : data_.laws) {
     rho_bar.setZero();

@@ -178,7 +178,7 @@ void DrivenPath::look_for_window() {
   const DrivenState base = falls ? before_ : here;
   const double low = falls ? here.t : before_.t;
   SingularWindow w{low, 0, {}};    // without nodes it prevents another search
-  constexpr double kLookedAt = 3;  // halves
+  constexpr double kLookedAt = 3;  // times the half width of a window: so near to it no other is searched
   for (const SingularWindow& known : windows_)
     if (std::abs(w.t - known.t) < kLookedAt * known.half) return;
   const double slope = std::abs((here.regularity - before_.regularity) / (here.t - before_.t));

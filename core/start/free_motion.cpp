@@ -59,14 +59,14 @@ class MotionNames {
     for (const Constraint& c : d_.constraints) add_points(c);
   }
 
-  struct Told {
+  struct Sentences {
     std::vector<std::string> alone, together;
     std::vector<Index> freedoms;  // of each body alone, and of each group
     Index all = 0;
   };
-  Told told() {
+  Sentences sentences() {
     for (const std::vector<int>& group : groups()) add_group(group);
-    return said_;
+    return sentences_;
   }
 
   std::vector<std::string> forbidden_twice() const {
@@ -207,12 +207,12 @@ class MotionNames {
       const MatrixXd L = free_in(columns_of({group[k]}));
       alone += L.cols();
       if (L.cols() > 0) add_alone(group[k], L);
-      said_.freedoms.push_back(L.cols());
+      sentences_.freedoms.push_back(L.cols());
       auto part = R.middleRows<6>(6 * static_cast<Index>(k));
       part -= (L * (L.transpose() * part)).eval();
     }
-    said_.freedoms.push_back(all);
-    said_.all += all;
+    sentences_.freedoms.push_back(all);
+    sentences_.all += all;
     if (alone < all) add_together(group, R, all - alone);
   }
 
@@ -224,13 +224,13 @@ class MotionNames {
     const std::string who = moving.size() > kMostNames ? fmt::format("{} bodies", moving.size())
                                                        : fmt::format("{}", fmt::join(moving, ", "));
     const char* const verb = moving.size() == 1 ? "moves" : "move together";
-    said_.together.push_back(freedoms == 1 ? fmt::format("{} {}", who, verb)
-                                           : fmt::format("{} {} with {} degrees of freedom", who, verb, freedoms));
+    sentences_.together.push_back(freedoms == 1 ? fmt::format("{} {}", who, verb)
+                                                : fmt::format("{} {} with {} degrees of freedom", who, verb, freedoms));
   }
 
   void add_alone(int body, const MatrixXd& L) {
-    if (L.cols() == 6) return said_.alone.push_back(name(body) + " moves freely");
-    if (L.cols() == 1) return said_.alone.push_back(name(body) + " " + one_motion(body, L));
+    if (L.cols() == 6) return sentences_.alone.push_back(name(body) + " moves freely");
+    if (L.cols() == 1) return sentences_.alone.push_back(name(body) + " " + one_motion(body, L));
     for (const JointPoint& point : points_[at(body)]) {
       const Vector3d s = frames_[at(body)].A.transpose() * (point.place - frames_[at(body)].r);
       double fastest = 0;
@@ -239,9 +239,9 @@ class MotionNames {
         fastest = std::max(fastest, (L.col(k).head<3>() + frames_[at(body)].A * omega.cross(s)).norm());
       }
       if (L.cols() == 3 && fastest < kZero * (1 + s.norm()))
-        return said_.alone.push_back(fmt::format("{} turns freely about joint '{}'", name(body), point.joint));
+        return sentences_.alone.push_back(fmt::format("{} turns freely about joint '{}'", name(body), point.joint));
     }
-    said_.alone.push_back(fmt::format("{} moves alone with {} degrees of freedom", name(body), L.cols()));
+    sentences_.alone.push_back(fmt::format("{} moves alone with {} degrees of freedom", name(body), L.cols()));
   }
 
   // v belongs to the centre of mass. The axis goes along w through c = r + w x v/w'w, where the body's velocity is
@@ -285,7 +285,7 @@ class MotionNames {
   std::vector<Frame> frames_;                    // [0] is the ground
   std::vector<std::vector<JointPoint>> points_;  // by body
   MatrixXd J_;
-  Told said_;
+  Sentences sentences_;
 };
 
 // Takes Newton steps of least length onto the joints and unit norms with drives held. Returns whether they converge.
@@ -315,7 +315,7 @@ std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly
   VectorXd moved = y;
   moved.head(StateLayout{data.n}.positions()) += kStep * here.general_motion(y);
   if (!close_again(data, start_time, moved)) return {};
-  const MotionNames::Told at_start = here.told(), near_by = MotionNames(data, moved).told();
+  const MotionNames::Sentences at_start = here.sentences(), near_by = MotionNames(data, moved).sentences();
   if (at_start.all != degrees_of_freedom || near_by.all != degrees_of_freedom) return {};
   // A user knows the axes at the start, so these are named.
   std::vector<std::string> all = at_start.freedoms == near_by.freedoms ? at_start.alone : near_by.alone;

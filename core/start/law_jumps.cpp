@@ -34,16 +34,16 @@ TimeLaw::Jet LawJumps::at(const TimeLaw& law, double t) {
   return law.at(inputs_, scratch_);
 }
 
-LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1) {
+LawJumps::Jump LawJumps::find(const TimeLaw& law, Derivative what, double t0, double t1) {
   TimeLaw::Jet a = at(law, t0), b = at(law, t1);
-  const auto value = [&](const TimeLaw::Jet& x) { return what == Of::f ? x.f : x.f_t; };
-  const auto rate = [&](const TimeLaw::Jet& x) { return what == Of::f ? x.f_t : x.f_tt; };
+  const auto value = [&](const TimeLaw::Jet& x) { return what == Derivative::f ? x.f : x.f_t; };
+  const auto rate = [&](const TimeLaw::Jet& x) { return what == Derivative::f ? x.f_t : x.f_tt; };
   const auto difference = [&](const TimeLaw::Jet& from, const TimeLaw::Jet& to, double h) {
     return value(to) - value(from) - h / 2 * (rate(from) + rate(to));
   };
   // A difference is compared with the size of the law and of its change at its rate; a smaller one is rounding.
   double size = std::max({std::abs(value(a)), std::abs(value(b)), (t1 - t0) * (std::abs(rate(a)) + std::abs(rate(b)))});
-  if (what == Of::f_t) size = std::max(size, std::max(std::abs(a.f), std::abs(b.f)) / (t1 - t0));
+  if (what == Derivative::f_t) size = std::max(size, std::max(std::abs(a.f), std::abs(b.f)) / (t1 - t0));
   const double shortest = 1e-14 * std::max(std::abs(t0), std::abs(t1));
   double wide = 0;  // the change over the last interval that is not yet so short
   while (true) {
@@ -64,7 +64,7 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1)
 
 std::string LawJumps::between(double t0, double t1) {
   for (const RowLaw* law : laws_) {
-    const Jump f = find(law->law, Of::f, t0, t1);
+    const Jump f = find(law->law, Derivative::f, t0, t1);
     if (f.size != 0) {
       return fmt::format(
           "the law of drive '{}' jumps by {:.3g} at t = {:.6g} s, which no motion follows. Let it pass smoothly, over "
@@ -72,7 +72,7 @@ std::string LawJumps::between(double t0, double t1) {
           "short time, from one value to the other",
           drive_of(data_, *law), f.size, f.t);
     }
-    const Jump f_t = find(law->law, Of::f_t, t0, t1);
+    const Jump f_t = find(law->law, Derivative::f_t, t0, t1);
     if (f_t.size != 0) {
       return fmt::format(
           "the law of drive '{}' changes its rate by {:.3g} 1/s at once at t = {:.6g} s: an impact, whose force has no "

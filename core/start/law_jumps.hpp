@@ -20,12 +20,12 @@ class LawJumps {
   std::string between(double t0, double t1);
 
  private:
-  enum class Of { f, f_t };
+  enum class Derivative { f, f_t };
   struct Jump {
     double t = 0, size = 0;
   };
   TimeLaw::Jet at(const TimeLaw& law, double t);
-  Jump find(const TimeLaw& law, Of what, double t0, double t1);
+  Jump find(const TimeLaw& law, Derivative what, double t0, double t1);
 
   const MechanismData& data_;
   std::vector<const RowLaw*> laws_;  // expressions only: constants and splines are smooth

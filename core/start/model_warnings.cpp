@@ -149,7 +149,7 @@ void add_reactions(const Mechanism& mechanism, const AssemblyResult& start, std:
   VectorXd of_spin = VectorXd::Zero(d.m);
   std::vector<SparseEntry> rows;
   int rank = -1;
-  std::map<std::string, bool> told;
+  std::map<std::string, bool> reported;
   for (const SensorPtr& any : d.sensors) {
     const auto* sensor = dynamic_cast<const ReactionSensor*>(any.get());
     if (!sensor) continue;
@@ -170,7 +170,7 @@ void add_reactions(const Mechanism& mechanism, const AssemblyResult& start, std:
         sensor->joint >= 0 ? fmt::format("the {} in joint '{}'", sensor->torque ? "reaction torque" : "reaction force",
                                          d.joint_names[at(sensor->joint)])
                            : std::string("the effort of a drive");
-    if (!told.emplace(what, true).second) continue;
+    if (!reported.emplace(what, true).second) continue;
     warnings.push_back(
         fmt::format("{} is not determined: equations of joints depend on each other, and a model of rigid bodies "
                     "cannot tell how the joints share the load. The value is the solution of least size that the "

@@ -121,7 +121,7 @@ class KinkControl {
  private:
   enum class State { clear, meets, crosses };
   static constexpr double kLeast = 0.01;       // sizes without kinks may have grown far beyond what crosses them
-  static constexpr double kMost = 6;           // as of other steps (step_control.hpp)
+  static constexpr double kMost = 6;           // times the last step: the most that other steps grow (step_control.hpp)
   static constexpr double kSmallError = 1e-6;  // allows more than kMost
   static constexpr double kShrunk = 0.9;       // after a rejection at most
   static constexpr double kRecovery = 1.1;     // of two intervals down to half of one: 15 steps until the next try

@@ -124,7 +124,7 @@ bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const Mot
   use_sparse_ = false;
   if (blocks_ && sparse_left_ == 0) {
     tried_ = trial == Trial::now;
-    if (factor_blocks() && (!tried_ || is_right())) return true;
+    if (factor_blocks() && (!tried_ || is_accurate())) return true;
     sparse_left_ = kSparseRun;
   }
   return turn_to_sparse();
@@ -230,7 +230,7 @@ bool StageMatrix::factor_sparse() {
 
 // Tries the factor on the forces of alternating accelerations of 1, with constraints. The residual of the answer must
 // be small against the largest force in it.
-bool StageMatrix::is_right() {
+bool StageMatrix::is_accurate() {
   answer_.setZero(), probe_.setZero();
   double largest = 0;
   for (int i = 0; i < stages_; ++i) {

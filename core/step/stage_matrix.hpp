@@ -59,7 +59,7 @@ class StageMatrix {
   void add_joint(const Joint& joint, int i, const MotionJacobian::Values& x);
   bool factor_sparse();
   bool turn_to_sparse();
-  bool is_right();
+  bool is_accurate();
   template <bool Transposed>
   void refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements);
   // With epsilon.

@@ -32,23 +32,23 @@ JumpWatch::JumpWatch(const Mechanism& mechanism, const SimulationSettings& setti
     : mechanism_(mechanism), motion_(motion), apart_(kApart * (settings.end_time - settings.start_time)) {
   const MechanismData& d = mechanism_.data();
   if (d.active.empty()) return;
-  const auto of_force = [](int index) { return Jump{Jump::Of::force, index, {}, 0, 0, {}, false}; };
+  const auto of_force = [](int index) { return Jump{Jump::Owner::force, index, {}, 0, 0, {}, false}; };
   // A mechanism and its laws are compiled at each rho; so are the switches of the laws.
-  const auto add_law = [&](const Jump& jump, const Program& p, Of of, ForcePlace place = {}) {
+  const auto add_law = [&](const Jump& jump, const Program& p, Inputs of, ForcePlace place = {}) {
     add(jump, p, switches_of(p), of, place);
   };
   d.forces->for_each([&]<class Kind>(const Kind& f, ForcePlace place) {
     if constexpr (HasLaw<Kind>)
-      if (f.law.program) add_law(of_force(f.force), *f.law.program, Of::law, place);
+      if (f.law.program) add_law(of_force(f.force), *f.law.program, Inputs::law, place);
   });
   for (const AppliedForce& f : d.applied)
-    for (const Program& component : f.components) add_law(of_force(f.force), component, Of::sensors);
+    for (const Program& component : f.components) add_law(of_force(f.force), component, Inputs::sensors);
   for (const RowLaw& law : d.laws)
     if (law.drive >= 0 && law.law.programs)
-      add_law({Jump::Of::drive, law.drive, {}, 0, 0, {}, false}, (*law.law.programs)[2], Of::time);
+      add_law({Jump::Owner::drive, law.drive, {}, 0, 0, {}, false}, (*law.law.programs)[2], Inputs::time);
   for (const Cost& cost : costs)
     if (const SwitchedProgram* p = cost.running ? cost.running->program() : nullptr)
-      add({Jump::Of::objective, 0, cost.name, 0, 0, {}, false}, p->program, p->switches, Of::sensors);
+      add({Jump::Owner::objective, 0, cost.name, 0, 0, {}, false}, p->program, p->switches, Inputs::sensors);
 }
 
 bool JumpWatch::Function::is_new(const Switch& s) const {
@@ -57,11 +57,11 @@ bool JumpWatch::Function::is_new(const Switch& s) const {
   return (s.motion && !motion) || !std::all_of(s.parameters.begin(), s.parameters.end(), is_known);
 }
 
-void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of,
+void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Program> switches, Inputs of,
                     ForcePlace place) {
   const MechanismData& d = mechanism_.data();
   const int P = static_cast<int>(d.rho.size());
-  const int time = of == Of::law ? P + 2 : P;
+  const int time = of == Inputs::law ? P + 2 : P;
   Function f{jump, &program, of, place, {}, {}, false, false};
   for (const Program& p : switches) {
     Switch s{{}, {}, false, 0, 0, 0};
@@ -78,7 +78,7 @@ void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Pr
   }
   if (f.switches.empty()) return;
   program.grow(scratch_);
-  const std::size_t inputs = static_cast<std::size_t>(of == Of::sensors ? P + 1 + mechanism_.sensors() : time + 1);
+  const std::size_t inputs = static_cast<std::size_t>(of == Inputs::sensors ? P + 1 + mechanism_.sensors() : time + 1);
   inputs_.resize(std::max(inputs_.size(), inputs));
   functions_.push_back(std::move(f));
 }
@@ -88,13 +88,13 @@ void JumpWatch::set_inputs(const Function& f, const StatePoint& at) {
   const std::size_t P = static_cast<std::size_t>(d.rho.size());
   std::copy(d.rho.begin(), d.rho.end(), inputs_.begin());
   inputs_[P] = at.t;
-  if (f.of == Of::law) {
+  if (f.of == Inputs::law) {
     d.forces->visit_law(f.place, [&](const auto& force) {
       const auto [i, j] = force.bodies();
       const auto [x, xdot] = force.measured(at.angles, body_at(at.y, i).frame, body_at(at.y, j).frame);
       inputs_[P] = x, inputs_[P + 1] = xdot, inputs_[P + 2] = at.t;
     });
-  } else if (f.of == Of::sensors) {
+  } else if (f.of == Inputs::sensors) {
     for (const int input : f.program->used_inputs())
       if (const int sensor = input - static_cast<int>(P) - 1; sensor >= 0)
         inputs_[static_cast<std::size_t>(input)] = mechanism_.sensor_value(sensor, at);
@@ -187,10 +187,12 @@ void JumpWatch::look_at_directions() {
     const auto direction = [&](const Eigen::VectorXd& y) {
       return f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).u;
     };
-    const auto is_known = [&](const Jump& j) { return j.size == 0 && j.of == Jump::Of::force && j.index == f.force; };
+    const auto is_known = [&](const Jump& j) {
+      return j.size == 0 && j.of == Jump::Owner::force && j.index == f.force;
+    };
     if (f.is_k_times_d() || direction(y0_).dot(direction(y1_)) > kTurned || std::ranges::any_of(found_, is_known))
       continue;
-    found_.push_back({Jump::Of::force, f.force, {}, 0, t1_, {}, true});
+    found_.push_back({Jump::Owner::force, f.force, {}, 0, t1_, {}, true});
   }
 }
 

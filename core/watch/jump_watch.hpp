@@ -39,7 +39,7 @@ class JumpWatch {
   void add_to(SimulationStatistics& statistics) const;
 
  private:
-  enum class Of { sensors, law, time };  // the inputs beside parameters and t
+  enum class Inputs { sensors, law, time };  // the inputs beside parameters and t
   struct Switch {
     Program program;
     std::vector<int> parameters;  // active ones that it uses
@@ -50,7 +50,7 @@ class JumpWatch {
   struct Function {
     Jump jump;  // the known part
     const Program* program;
-    Of of;
+    Inputs of;
     ForcePlace place;  // of a force with a law
     std::vector<Switch> switches;
     std::vector<int> parameters;         // named by its reported jumps
@@ -59,7 +59,8 @@ class JumpWatch {
     bool is_new(const Switch& s) const;  // names more
   };
   // switches are those of the program.
-  void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of, ForcePlace place = {});
+  void add(const Jump& jump, const Program& program, std::span<const Program> switches, Inputs of,
+           ForcePlace place = {});
   void set_inputs(const Function& f, const StatePoint& at);
   void place_at(double theta);  // sets t_, y_ between the last state and the present one
   void set_inputs_at(double theta, const Function& f);

@@ -53,7 +53,7 @@ QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> cos
       integrals_(kIntegrals * costs.size()),
       g_(nodes_.size()) {}
 
-std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what) {
+std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g, Integrand what) {
   if (start_ == end_) start_ = end_ = step.t;
   start_ = std::min(start_, step.t), end_ = std::max(end_, step.t + step.h);
   Integral& integral = integrals_[kIntegrals * cost + static_cast<std::size_t>(what)];
@@ -79,7 +79,7 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
   const double error = size * std::pow(share, static_cast<double>(method_.order) / power);
   integral.error += error;
   if (error > integral.worst) integral.worst = error, integral.worst_t = step.t;
-  if (what != Of::value || costs_[cost].is_extreme) return {};
+  if (what != Integrand::value || costs_[cost].is_extreme) return {};
   if (!(error > kPoor * integral.of_size) || integral.searches++ > kMostSearches) return {};
   const double t = pole(step, *costs_[cost].running);
   if (std::isnan(t)) return {};

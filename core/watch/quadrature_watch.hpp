@@ -39,12 +39,12 @@ class QuadratureWatch {
  public:
   QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion);
 
-  enum class Of { value, along_motion, along_parameters };  // g, g_y ydot, g_rho rho
-  static constexpr std::size_t kIntegrals = 3;              // of each cost
+  enum class Integrand { value, along_motion, along_parameters };  // g, g_y ydot, g_rho rho
+  static constexpr std::size_t kIntegrals = 3;                     // of each cost
 
   // Call this after each step with the integrand of each running cost at each node (Method::nodes). Returns a reason to
   // end the run, in words, or an empty string.
-  std::string look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what = Of::value);
+  std::string look_at(const Step& step, std::size_t cost, std::span<const double> g, Integrand what = Integrand::value);
 
   void add_to(SimulationStatistics& statistics) const;
 

@@ -30,9 +30,10 @@ class TrueLimits {
   // The evaluator's objectives: the one that is minimised, then those that are bounded.
   TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator);
 
-  // c: of the program at the solution; true values: of the evaluator; sides: per constraint 1 where its upper bound
-  // holds the objective back, -1 where the lower one does, else 0. False where the limits hold and are used, or where
-  // the bounds were moved often enough; otherwise the program has new bounds.
+  // Gives the program new bounds, and returns true, if true values break limits at the solution, or leave them unused.
+  // Returns false if there is nothing to move, or if bounds were moved often enough. c: the program's constraints at
+  // the solution. sides: per constraint 1 if its upper bound holds the objective back, -1 if the lower one does, else
+  // 0.
   bool move(DesignProgram& program, const Eigen::VectorXd& c, const std::vector<std::optional<double>>& true_values,
             const Eigen::VectorXi& sides);
 

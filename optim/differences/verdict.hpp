@@ -7,7 +7,7 @@ namespace mbsopt::inline optim {
 
 enum class Verdict {
   agrees,  // to the threshold
-  buried,  // to the error of the differences themselves, which is larger than the threshold
+  buried,  // agrees to the error of the differences alone, which is larger than the threshold
   zero,    // exactly zero by every method
   failed,  // the differences could not be evaluated
   disagrees,

@@ -34,7 +34,7 @@ Program compiled(const Field& field, const Symbols& symbols, const std::string& 
 bool depends_on_time(const Scene& scene) {
   bool found = !scene.drives.empty() || !scene.signals.empty();
   FieldVisitor visitor(
-      [&](const FieldPlace&, const Expression& e, Names) {
+      [&](const FieldPlace&, const Expression& e, Scope) {
         const std::vector<std::string> names = e.names();
         found = found || std::find(names.begin(), names.end(), "t") != names.end();
       },
@@ -313,8 +313,8 @@ class Experiment::Reading {
     return values;
   }
 
-  // The times at which the run is read: those of the measurements, or with a delay one per sample; then those of its
-  // ends, whose states are read, too. Returns why it cannot be.
+  // Sets the times at which the run is read: those of the measurements, or with a delay one per sample; then its start
+  // and end, whose states are read, too. Returns an error in words if a delay is no number.
   std::string set_times() {
     if (!of_.delayed_) times_ = of_.times_;
     for (const Sample& sample : of_.samples_) {

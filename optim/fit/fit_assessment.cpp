@@ -16,9 +16,10 @@ namespace {
 constexpr double kTolerances = 10, kLeastAccuracy = 1e-5;
 // The sums of so many records tell a variance: Student's quantile is then 2.09, against 1.96 for any number.
 constexpr std::size_t kManyRecords = 20;
-constexpr double kTouches = 1e-9;  // of the bound's size: the trust region puts solutions exactly on bounds
+constexpr double kTouches = 1e-9;  // of the bound's size: solutions at a bound are exactly on it
 
-// Chooses by the residuals of the experiments of the stack, which are scored already.
+// The kind of covariance that is left to the program: for white noise where the residuals pass its tests, else one that
+// allows for correlation in time. The experiments of the stack are scored already.
 CovarianceType covariance_for(const FitContext& fit, const ExperimentStack& stack) {
   const std::size_t records = stack.records_in_time().size();
   const bool many = records >= kManyRecords;

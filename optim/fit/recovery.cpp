@@ -38,7 +38,8 @@ std::vector<ResampledChannel> records_of(const Problem& problem, const std::vect
     record.rows.emplace_back(experiment, row);
     record.model.push_back(sample.model), record.noise.push_back(sample.measured - sample.model);
   }
-  // P less the equations of tied windows.
+  // Residuals of a fit are smaller than the noise, by the parameters that took part of it: sqrt(N/(N - P)), where
+  // equations that tie windows count for less of P.
   const auto priors = std::ranges::count_if(fit.parameters, [](const auto& p) { return p.prior.has_value(); });
   const double N = static_cast<double>(fit.samples);
   const double left = static_cast<double>(fit.statistics.degrees_of_freedom - priors);
@@ -87,7 +88,7 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
                  const RecoveryOptions& options) {
   const std::vector<ResampledChannel> records = records_of(problem, data, fit);
   const bool in_blocks = options.bootstrap || fit.statistics.covariance_type != CovarianceType::white;
-  std::mutex told;
+  std::mutex progress_lock;
   std::atomic<bool> stopped = false;
   int done = 0;
   std::vector<IdentificationResult> results(static_cast<std::size_t>(options.seeds));
@@ -106,12 +107,12 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
     IdentificationOptions identification;
     identification.user_forces = options.user_forces;
     identification.simulation_progress = [&](double t) {
-      const std::scoped_lock lock(told);
+      const std::scoped_lock lock(progress_lock);
       if (options.simulation_progress && !options.simulation_progress(t)) stopped = true;
       return !stopped;
     };
     results[job] = run_identification(again, simulated, identification);
-    const std::scoped_lock lock(told);
+    const std::scoped_lock lock(progress_lock);
     if (options.progress && !options.progress(++done)) stopped = true;
   });
 

@@ -32,7 +32,7 @@ namespace mbsopt::inline optim {
 
 inline constexpr int kSigmaRounds = 40;
 inline constexpr double kNoisy = 2;           // times the noise: a sigma that no other optimum lowers by much
-inline constexpr double kSigmaChange = 1e-6;  // relative
+inline constexpr double kSigmaChange = 1e-6;  // relative, of a sigma: below it the estimates have settled
 
 bool has_sigma(const ChannelSpec& channel);            // other than the default
 bool estimates_sigma(const IdentificationSpec& spec);  // in a fitted experiment

@@ -16,9 +16,9 @@ CaseEvaluator::CaseEvaluator(const Problem& problem, const std::vector<std::stri
     : problem_(problem), progress_(std::make_shared<std::mutex>()), threads_(threads) {
   EvaluatorOptions of_case = options;
   if (options.progress && threads > 1 && problem.cases.size() > 1)
-    of_case.progress = [lock = progress_, told = options.progress](double t) {
+    of_case.progress = [lock = progress_, progress = options.progress](double t) {
       const std::lock_guard guard(*lock);
-      return told(t);
+      return progress(t);
     };
   const std::vector<Problem> problems = problems_of_cases(problem);
   for (std::size_t c = 0; c < problems.size(); ++c) {
@@ -40,7 +40,7 @@ std::string CaseEvaluator::in_case(std::size_t c, const std::string& what) const
   return fmt::format("{} ({})", in_names_of_problem(what, load_case, problem_.scene), load_case.name);
 }
 
-std::string CaseEvaluator::told(std::size_t c, const std::string& words) const {
+std::string CaseEvaluator::with_case(std::size_t c, const std::string& words) const {
   const CaseSpec& load_case = problem_.cases[c];
   return fmt::format("case '{}': {}", load_case.name, in_names_of_problem(words, load_case, problem_.scene));
 }
@@ -76,9 +76,9 @@ CaseEvaluation CaseEvaluator::evaluated(const Eigen::VectorXd& rho, const Evalua
   for (std::size_t c = 0; c < cases() && has_cases(); ++c) {
     const Evaluation& e = found[c];
     all.simulations += e.simulations, all.wall_seconds += e.wall_seconds;
-    for (const std::string& warning : e.warnings) all.warnings.push_back(told(c, warning));
+    for (const std::string& warning : e.warnings) all.warnings.push_back(with_case(c, warning));
     if (!e.ok) {
-      if (all.ok || c == 0) all.message = told(c, e.message);
+      if (all.ok || c == 0) all.message = with_case(c, e.message);
       all.ok = false;
       continue;
     }

@@ -58,7 +58,7 @@ class CaseEvaluator {
 
   bool has_cases() const { return !problem_.cases.empty(); }
   // "case 'cold': words", with the problem's names of parameters.
-  std::string told(std::size_t c, const std::string& words) const;
+  std::string with_case(std::size_t c, const std::string& words) const;
 
   const Problem problem_;
   std::vector<Evaluator> evaluators_;

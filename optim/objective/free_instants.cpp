@@ -50,7 +50,7 @@ struct Columns {
   std::vector<std::size_t> of_points;
 };
 Columns columns_in_order(const MatrixXd& D, Index first) {
-  MatrixXd least(D.rows(), D.cols());  // sum of the points so far, the last one at this column or before it
+  MatrixXd least(D.rows(), D.cols());  // (k, i): the least sum of points 0 to k, with point k at column i or before it
   Eigen::MatrixXi at(D.rows(), D.cols());
   for (Index k = 0; k < D.rows(); ++k) {
     for (Index i = 0; i < D.cols(); ++i) {

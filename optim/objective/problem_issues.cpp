@@ -204,11 +204,11 @@ void check_meaning(Checker& checker, const CaseSpec& load_case) {
     checker.issue(checker.path("end_time"), "the case ends at " + text_of(*load_case.end_time) +
                                                 " s, which must be after its start at " +
                                                 text_of(simulation.start_time) + " s");
-  const std::vector<std::string> parameters = facts.names(To::parameter);
+  const std::vector<std::string> parameters = facts.names(ElementKind::parameter);
   const std::vector<Definition>& definitions = facts.scene().definitions;
   for (const Definition& override : load_case.overrides) {
     const std::string place = child_path(checker.path("overrides"), override.name);
-    if (!facts.has(To::parameter, override.name))
+    if (!facts.has(ElementKind::parameter, override.name))
       checker.issue(place, "there is no parameter '" + override.name + "'" + did_you_mean(override.name, parameters) +
                                "; known: " + joined(parameters));
     for (const std::string& name : override.value.names())

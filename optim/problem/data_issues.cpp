@@ -198,7 +198,7 @@ class DataCheck {
     if (!check_turns(c, rows)) check_size(c, std::abs(measured[*least]) > std::abs(measured[*most]) ? *least : *most);
   }
 
-  // The sensor of an angle in rad that the column shows, by a known gain.
+  // The sensor of a channel, if it is an angle in rad and the gain is a number. Else null.
   const Sensor* angle_sensor(const ChannelSpec& channel) const {
     const auto sensor = std::ranges::find(scene_.sensors, channel.sensor, &Sensor::name);
     const bool angle = sensor != scene_.sensors.end() && unit_of(scene_, *sensor) == "rad" && channel.gain.is_number();

@@ -10,7 +10,7 @@ std::vector<ParameterUse> parameter_uses(const Problem& problem) {
   const SceneFacts facts(problem.scene);
   std::vector<ParameterUse> uses;
   for (const Parameter& p : problem.scene.parameters) uses.push_back({p.name, {}});
-  auto on_expression = [&](const FieldPlace& at, const Expression& expression, Names names) {
+  auto on_expression = [&](const FieldPlace& at, const Expression& expression, Scope names) {
     if (expression.is_number()) return;
     const Symbols& symbols = facts.symbols(names);
     const Program program(expression, symbols);

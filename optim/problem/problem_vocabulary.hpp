@@ -34,11 +34,11 @@ inline constexpr Choice<LossType> kLosses[] = {{"squared", LossType::squared},
 
 void describe(auto& v, Like<ObjectiveSample> auto& s) {
   v.plain("time", s.time, kAny, {"[s]", Need::required, dimension::kTime});
-  v.expression("value", s.value, Names::objective, {"added to the objective", Need::required});
+  v.expression("value", s.value, Scope::objective, {"added to the objective", Need::required});
 }
 
 void describe(auto& v, Like<TrackTerm> auto& t) {
-  v.reference("sensor", t.sensor, To::sensor, {"sensor that should follow the data", Need::required});
+  v.reference("sensor", t.sensor, ElementKind::sensor, {"sensor that should follow the data", Need::required});
   describe_samples(v, t, "file");
   v.number("weight", t.weight, {"of each square"});
   v.choice(
@@ -55,21 +55,21 @@ void describe(auto& v, Like<EigenvalueSpec> auto& e) {
 
 void describe(auto& v, Like<UserCostSpec> auto& c) {
   v.text("cost", c.cost, {"its name", Need::required});
-  v.references("bodies", c.bodies, To::body, {"whose states it reads, in its order; all when absent"});
+  v.references("bodies", c.bodies, ElementKind::body, {"whose states it reads, in its order; all when absent"});
   v.named("parameters", c.parameters, {"parameters of the cost, each an expression of parameters of the problem"});
 }
 
 void describe_means(auto& v, auto& means) {
   for (std::size_t k = 0; k < std::size(kMeanKinds); ++k)
-    v.law(kMeanKinds[k].name, means[k], Names::objective, {kMeanKinds[k].description});
+    v.law(kMeanKinds[k].name, means[k], Scope::objective, {kMeanKinds[k].description});
 }
 
 void describe(auto& v, Like<ObjectiveSpec> auto& o) {
-  v.law("running", o.running, Names::objective, {"integrated over time; of sensors, t and parameters"});
-  v.law("terminal", o.terminal, Names::objective, {"added, at the end time; of sensors, t and parameters"});
+  v.law("running", o.running, Scope::objective, {"integrated over time; of sensors, t and parameters"});
+  v.law("terminal", o.terminal, Scope::objective, {"added, at the end time; of sensors, t and parameters"});
   v.list("samples", o.samples, {"added, each at its time"});
   v.list("track", o.track, {"added: weighted squares of sensor minus data at the rows of a CSV file"});
-  v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
+  v.law("parameters_only", o.parameters_only, Scope::none, {"added; of parameters only"});
   describe_means(v, o.means);
   v.object("eigenvalue", o.eigenvalue, {"alone: frequency or damping ratio of a mode near the initial equilibrium"});
   v.object("user", o.user, {"alone: a cost written in C++, of a plug-in or of the program"});
@@ -80,10 +80,10 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
 
 void describe(auto& v, Like<ObjectiveBound> auto& b) {
   v.reference(
-      "objective", b.objective, To::objective,
+      "objective", b.objective, ElementKind::objective,
       {"objective to bound; or, in its place, one of maximum_of, minimum_of, peak_to_peak_of, rms_of and sampled"});
   describe_means(v, b.means);
-  v.law("sampled", b.sampled, Names::objective, {"its value at each of the instants start_time + k every"});
+  v.law("sampled", b.sampled, Scope::objective, {"its value at each of the instants start_time + k every"});
   v.plain("every", b.every, kPositive, {"of sampled [s]"});
   v.plain("sharpness", b.sharpness, kPositive,
           {"of an extreme in place of an objective; when absent 100 over the larger absolute value of the bounds"});
@@ -123,7 +123,7 @@ void describe(auto& v, Like<MultistartSpec> auto& m) {
 }
 
 void describe(auto& v, Like<DriveLaw> auto& d) {
-  v.reference("drive", d.drive, To::drive, {"the drive", Need::required});
+  v.reference("drive", d.drive, ElementKind::drive, {"the drive", Need::required});
   v.time_law("law", d.law, d.samples,
              {"its law in this experiment or case: of t and parameters, or a CSV file", Need::required});
 }
@@ -143,7 +143,7 @@ void describe(auto& v, Like<CaseSpec> auto& c) {
 }
 
 void describe(auto& v, Like<DesignSpec> auto& d) {
-  v.reference_or("minimize", d.minimize, To::objective,
+  v.reference_or("minimize", d.minimize, ElementKind::objective,
                  {"the objective to minimise; to maximise f, one that is -f", Need::required}, [&](auto& inside) {
                    inside.word("over", d.over, Words{"sum max"},
                                {"sum or maximum of its weighted values in the load cases"});
@@ -152,21 +152,21 @@ void describe(auto& v, Like<DesignSpec> auto& d) {
                                  "largest at the start"});
                  });
   v.list("subject_to", d.subject_to, {"bounds on objectives; those of extremes hold for the true ones"});
-  v.references("variables", d.variables, To::parameter, {"parameters that may change", Need::required});
+  v.references("variables", d.variables, ElementKind::parameter, {"parameters that may change", Need::required});
   v.object("optimizer", d.optimizer, {"how it is minimised"});
   v.object("multistart", d.multistart, {"from several starts, in parallel"});
 }
 
 void describe(auto& v, Like<ChannelSpec> auto& c) {
   v.text("column", c.column, {"header of the column, with its unit (\"theta [deg]\") or without it", Need::required});
-  v.reference("sensor", c.sensor, To::sensor, {"sensor whose values the column holds", Need::required});
+  v.reference("sensor", c.sensor, ElementKind::sensor, {"sensor whose values the column holds", Need::required});
   v.text("unit", c.unit, {"of the column, instead of the unit in the header; without either it is SI"});
   v.plain("unwrap", c.unwrap, kAny, {"true: the column jumps by whole turns, which are taken out"});
   v.number("sigma", c.sigma, {"standard deviation of the noise; a number is in SI, also where the column is not"});
   v.number("gain", c.gain, {"measured = gain * sensor + bias + noise"});
-  v.expression("bias", c.bias, Names::time_law,
+  v.expression("bias", c.bias, Scope::time_law,
                {"a number is in SI, also where the column is not; also of t and signals"});
-  v.expression("delay", c.delay, Names::time_law,
+  v.expression("delay", c.delay, Scope::time_law,
                {"measured(t) = gain * sensor(t - delay) + bias + noise [s]", Need::optional, dimension::kTime});
   v.choice("estimate_sigma", c.estimate_sigma, kSigmaEstimates,
            {"true: sigma is estimated from the residuals of this channel, starting at the given one; shared: from all "
@@ -195,10 +195,10 @@ void describe(auto& v, Like<ExperimentSpec> auto& e) {
   v.plain("end_time", e.end_time, kAny,
           {"[s]; later rows are left out; all are used when absent", Need::optional, dimension::kTime});
   v.list("channels", e.channels, {"columns that are compared", Need::required});
-  v.values_of("overrides", e.overrides, To::parameter, kAny, {"parameter values of this experiment"});
+  v.values_of("overrides", e.overrides, ElementKind::parameter, kAny, {"parameter values of this experiment"});
   v.named("signals", e.signals, {"samples of signals in this experiment, instead of the signals' own"});
   v.list("drives", e.drives, {"laws of drives in this experiment"});
-  v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});
+  v.references("free", e.free, ElementKind::parameter, {"parameters with a value of their own in this experiment"});
   v.object("windows", e.windows,
            {"cuts the experiment into windows, each with its own values of the free parameters; these must act on the "
             "start"});
@@ -207,7 +207,7 @@ void describe(auto& v, Like<ExperimentSpec> auto& e) {
 
 void describe(auto& v, Like<IdentificationSpec> auto& i) {
   v.list("experiments", i.experiments, {"measured motions", Need::required});
-  v.references("variables", i.variables, To::parameter, {"parameters to fit", Need::required});
+  v.references("variables", i.variables, ElementKind::parameter, {"parameters to fit", Need::required});
   v.plain("sigma_is_known", i.sigma_is_known, kAny,
           {"true: the covariance is not scaled by the variance of the residuals"});
   v.choice("covariance", i.covariance, kCovariances,

@@ -22,7 +22,7 @@ namespace {
 struct Mentions {
   std::set<std::string> parameters, bodies;
   bool whole = false;  // a quantity of all bodies
-  std::set<std::pair<To, std::string>> elements;
+  std::set<std::pair<ElementKind, std::string>> elements;
 };
 
 class MentionSearch {
@@ -52,7 +52,7 @@ class MentionSearch {
         force.kind);
     describe_to(found, force);
     if (const auto* const user = std::get_if<UserForceSpec>(&force.kind))
-      for (const std::string& body : bodies_of(*user)) add(To::body, body, found);
+      for (const std::string& body : bodies_of(*user)) add(ElementKind::body, body, found);
   }
   void add(const Sensor& sensor, Mentions& found) const {
     found.whole = found.whole || measures_everything(sensor);
@@ -62,16 +62,16 @@ class MentionSearch {
     found.whole = found.whole || objective.eigenvalue || (objective.user && objective.user->bodies.empty());
     describe_to(found, objective);
   }
-  void add(const Expression& expression, Names names, Mentions& found) const {
+  void add(const Expression& expression, Scope names, Mentions& found) const {
     if (expression.is_number()) return;
     const Symbols& symbols = facts_.symbols(names);
     const Program program(expression, symbols);
     for (const int input : program.used_inputs()) {
       const std::string& name = symbols.input_names()[static_cast<std::size_t>(input)];
-      if (input < facts_.symbols(Names::none).inputs())
+      if (input < facts_.symbols(Scope::none).inputs())
         found.parameters.insert(name);
-      else if (names == Names::objective || names == Names::sensor || names == Names::state)
-        add(To::sensor, name, found);
+      else if (names == Scope::objective || names == Scope::sensor || names == Scope::state)
+        add(ElementKind::sensor, name, found);
     }
   }
 
@@ -93,28 +93,28 @@ class MentionSearch {
 
   void describe_to(Mentions& found, const auto& element) const {
     FieldVisitor visitor(
-        [&](const FieldPlace& at, const Expression& expression, Names names) {
+        [&](const FieldPlace& at, const Expression& expression, Scope names) {
           if (!at.in_named_point && !at.in_drawing) add(expression, names, found);
         },
         [&](const std::string& body, const std::string& point) { add_point(body, point, found); },
-        [&](To to, const std::string& name) { add(to, name, found); });
+        [&](ElementKind to, const std::string& name) { add(to, name, found); });
     describe(visitor, element);
   }
   void add_point(const std::string& body, const std::string& point, Mentions& found) const {
     const Body* const owner = facts_.body(body);
     if (!owner) return;
     if (const auto it = owner->points.find(point); it != owner->points.end())
-      for (const Field& field : it->second) add(field, Names::none, found);
+      for (const Field& field : it->second) add(field, Scope::none, found);
   }
-  void add(To to, const std::string& name, Mentions& found) const {
+  void add(ElementKind to, const std::string& name, Mentions& found) const {
     const auto add_if_any = [&](const auto* element) {
       if (element && found.elements.emplace(to, name).second) add(*element, found);
     };
-    if (to == To::body && facts_.body(name)) found.bodies.insert(name);
-    if (to == To::joint) add_if_any(facts_.joint(name));
-    if (to == To::drive) add_if_any(facts_.drive(name));
-    if (to == To::force) add_if_any(facts_.force(name));
-    if (to == To::sensor) add_if_any(facts_.sensor(name));  // "t" is none
+    if (to == ElementKind::body && facts_.body(name)) found.bodies.insert(name);
+    if (to == ElementKind::joint) add_if_any(facts_.joint(name));
+    if (to == ElementKind::drive) add_if_any(facts_.drive(name));
+    if (to == ElementKind::force) add_if_any(facts_.force(name));
+    if (to == ElementKind::sensor) add_if_any(facts_.sensor(name));  // "t" is none
   }
 
   SceneFacts facts_;
@@ -173,7 +173,7 @@ class Reach {
     Mentions observed = observed_by(problem);
     bodies_.observe(observed);
     if (observed.whole || !observed.bodies.empty())
-      for (const Field& field : scene_.gravity) search_.add(field, Names::none, observed);
+      for (const Field& field : scene_.gravity) search_.add(field, Scope::none, observed);
     for (Mentions& element : model)
       if (bodies_.matter(element)) observed.parameters.merge(element.parameters);
     parameters_ = std::move(observed.parameters);
@@ -209,7 +209,7 @@ class Reach {
       for (const ExperimentSpec& experiment : problem.identification->experiments) {
         for (const ChannelSpec& channel : experiment.channels) search_.add(channel, observed);
         for (const DriveLaw& law : experiment.drives)
-          if (!law.samples) search_.add(law.law, Names::time_law, observed);
+          if (!law.samples) search_.add(law.law, Scope::time_law, observed);
       }
     if (problem.objectives.empty() && !problem.identification) {
       for (const Sensor& sensor : scene_.sensors) search_.add(sensor, observed);

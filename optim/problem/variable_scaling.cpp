@@ -32,8 +32,8 @@ double range_of(const Parameter& p) { return p.upper.value_or(kInfinity) - p.low
 
 double linear_scale(const Parameter& p, double felt) {
   const double size = std::abs(p.value), range = range_of(p), reach = std::min(range / kWideRange, felt);
-  const bool says = size > 0 && kWideRange * size >= std::min(range, felt);
-  return says ? size : reach > 0 && std::isfinite(reach) ? reach : size > 0 ? size : 1;
+  const bool info = size > 0 && kWideRange * size >= std::min(range, felt);
+  return info ? size : reach > 0 && std::isfinite(reach) ? reach : size > 0 ? size : 1;
 }
 
 }  // namespace

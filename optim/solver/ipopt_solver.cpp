@@ -168,7 +168,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
     if (iterate_.size() == 0 || !evaluate(iterate_)) return !out_of_evaluations_;  // it is in memory
     const double distance = optimality(problem_, iterate_, *point_);
-    if (!told(*point_, distance)) return false;
+    if (!report(*point_, distance)) return false;
     if (points_.feasible(*point_)) look_at_iterate(distance);
     return !out_of_evaluations_ && end_ == SearchEnd::none;
   }
@@ -187,7 +187,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     const double distance = look(*point_);
     if (distance > tolerance_) return false;
     take_solution();
-    told(*point_, distance);
+    report(*point_, distance);
     end_start_optimal();
     return true;
   }
@@ -274,7 +274,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   void go_on_from_best() {
     x_start_ = points_.best_x();
     iterations_before_ = result_.iterations;
-    if (end_ == SearchEnd::creeping) second_order_ = false, left_newton_at_ = result_.iterations;
+    if (end_ == SearchEnd::creeping) second_order_ = false, newton_until_ = result_.iterations;
     recent_.clear(), end_ = SearchEnd::none;
     ++round_;
   }
@@ -295,10 +295,10 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     const SolverStatus status = result_.status;
     if (status == SolverStatus::converged && distance > tolerance_)
       result_.message += fmt::format(" (as Ipopt measures them; by the measure of all methods to {:.1e})", distance);
-    if (left_newton_at_ > 0)
+    if (newton_until_ > 0)
       result_.message +=
           fmt::format("; by L-BFGS from iteration {} on, since steps by Hessians gained less than 1 % in {}",
-                      left_newton_at_, counted(kCreeping, "iteration"));
+                      newton_until_, counted(kCreeping, "iteration"));
     if (!best_is_feasible()) return;
     if ((status == SolverStatus::no_progress || status == SolverStatus::infeasible) &&
         distance <= kAcceptable * tolerance_) {
@@ -402,7 +402,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   SearchEnd end_ = SearchEnd::none;  // of this round, if it ends here
   bool second_order_, out_of_evaluations_ = false;
   int round_ = 0, iterations_before_ = 0;
-  int left_newton_at_ = 0;  // iteration; 0: never
+  int newton_until_ = 0;  // iteration at which BFGS replaced it; 0: never
 };
 
 }  // namespace

@@ -147,7 +147,7 @@ class Search {
   // Ends with a status and a message.
   void iterate() {
     LinearModel model(problem_, point_);
-    if (!told(model, 0)) return;
+    if (!report(model, 0)) return;
     first_size_ = model.size;
     if (options_.large_residuals) equalise(model.units);
     VectorXd d = step(model, lambda_);
@@ -161,7 +161,7 @@ class Search {
       const bool accepted = std::isfinite(trial.cost) && (trial.gained > kAccepted * std::max(trial.promised, 0.0) ||
                                                           (settled && trial.gained >= 0));
       if (accepted) accept(std::move(trial), model);
-      if (!told(model, d.norm())) return;
+      if (!report(model, d.norm())) return;
       if (settled) return converged(model, lambda_);
       if (!accepted && is_last(trial, model, d)) return;
       d = accepted ? step(model, lambda_) : shorter_step(model, d, trial);
@@ -372,7 +372,7 @@ class Search {
         fmt::format("converged: cost and parameters change by less than {:g} of themselves", options_.tolerance));
   }
 
-  bool told(const LinearModel& model, double step) {
+  bool report(const LinearModel& model, double step) {
     const double gradient = free_gradient(model).lpNorm<Eigen::Infinity>();
     if (!options_.progress || options_.progress({result_.iterations, cost_, gradient, step, x_, point_.z})) return true;
     result_.end_on_request();

@@ -55,7 +55,7 @@ inline constexpr double kSimulationNoise = 1e-4;
 struct LearntCurvature {
   explicit LearntCurvature(Eigen::Index variables) : S(variables) {}
   ResidualCurvature S;
-  bool takes_part = false;  // in the next step
+  bool takes_part = false;  // whether S is in the model of the next step
 };
 
 struct LeastSquaresOptions {

@@ -89,7 +89,7 @@ class NloptSearch : private NlpSearch {
     }
     VectorXd x = x_start;
     nlopt_result code = optimized(x);
-    if (creeps_) {
+    if (is_creeping_) {
       const Optimizer finish(nlopt_create(NLOPT_LD_SLSQP, n), nlopt_destroy);
       hand_over_to(finish.get(), x_start);
       x = points_.best_x();
@@ -132,7 +132,7 @@ class NloptSearch : private NlpSearch {
       double f = 0;
       code = nlopt_optimize(opt_, x.data(), &f);
       // A line search that stalls with its learnt curvature may progress without it.
-      if (ended_ || (creeps_ && !handed_over_) || !stalled() || !(points_.best().f < f_before)) break;
+      if (ended_ || (is_creeping_ && !handed_over_) || !stalled() || !(points_.best().f < f_before)) break;
       x = points_.best_x();
     }
     return code;
@@ -148,12 +148,12 @@ class NloptSearch : private NlpSearch {
 
   // Separable models do not represent a valley that is oblique to the variables.
   void look_for_gain() {
-    if (method_.constraints != ConstraintSupport::inequalities || creeps_ || ended_) return;
+    if (method_.constraints != ConstraintSupport::inequalities || is_creeping_ || ended_) return;
     if (result_.evaluations < next_look_) return;
     const double f = points_.best().f;
-    creeps_ = points_.feasible(points_.best()) && last_look_f_ - f <= kLeastGain * std::abs(f);
+    is_creeping_ = points_.feasible(points_.best()) && last_look_f_ - f <= kLeastGain * std::abs(f);
     next_look_ = result_.evaluations + kCreeping, last_look_f_ = f;
-    if (creeps_ && opt_) nlopt_force_stop(opt_);
+    if (is_creeping_ && opt_) nlopt_force_stop(opt_);
   }
 
   // Sets bounds, and the sizes of steps and changes that end the search.
@@ -254,7 +254,7 @@ class NloptSearch : private NlpSearch {
 
   void took_better(const NlpPoint& point) {
     if (result_.evaluations > 1) ++result_.iterations;  // not the start
-    if (!told(point, method_.gradients ? optimality(problem_, points_.x(), point) : kUnknown)) stop_on_request();
+    if (!report(point, method_.gradients ? optimality(problem_, points_.x(), point) : kUnknown)) stop_on_request();
     if (options_.max_iterations && result_.iterations >= *options_.max_iterations)
       end_at_limit(*options_.max_iterations, "iteration");
   }
@@ -353,7 +353,7 @@ class NloptSearch : private NlpSearch {
   NlpPoint last_good_, stand_in_;
   VectorXd last_good_x_;
   double f_worst_ = 0;
-  bool creeps_ = false, handed_over_ = false;
+  bool is_creeping_ = false, handed_over_ = false;
   long next_look_ = kCreeping;
   double last_look_f_ = std::numeric_limits<double>::infinity();
 };

@@ -15,7 +15,7 @@ double NlpSearch::look(const NlpPoint& point) {
   return distance;
 }
 
-bool NlpSearch::told(const NlpPoint& point, double distance) const {
+bool NlpSearch::report(const NlpPoint& point, double distance) const {
   return !progress_ || progress_({result_.iterations, point.f, problem_.violation(point.c), distance, points_.x()});
 }
 

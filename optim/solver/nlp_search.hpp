@@ -36,7 +36,7 @@ class NlpSearch {
   double look(const NlpPoint& point);
   bool has_solution() const { return solution_x_.size() > 0 && as_good_as_best(solution_.f); }
   // Reports the last point of points_. Returns whether the search goes on.
-  bool told(const NlpPoint& point, double distance) const;
+  bool report(const NlpPoint& point, double distance) const;
   // The result becomes the solution. If there is none, it becomes the best point.
   void take_solution();
   bool best_is_feasible() const { return points_.feasible(points_.best()); }

@@ -194,7 +194,7 @@ class Search {
     return pair;
   }
 
-  // The exact one is a.
+  // Takes the gradients of two ways to the same answer that agree best. `a` is the more exact way.
   void add_gradients(Candidate& a, Candidate& b, TradeoffReference& reference) {
     if (!runs_.has_gradients() || !options_.gradients) return;
     Gradients best = closest_gradients(gradients_of(a), gradients_of(b));

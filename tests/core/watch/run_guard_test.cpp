@@ -47,7 +47,7 @@ TEST_CASE("a bushing below half a turn runs through", "[simulation]") {
 }
 
 TEST_CASE("a body that turns more often than steps are allowed is refused at the start", "[simulation]") {
-  const auto [method, wx, wy, says] = GENERATE(
+  const auto [method, wx, wy, info] = GENERATE(
       table<std::string, std::string, std::string, std::string>({{"dopri853", "1e9", "3e8", "1.04e+09 rad/s"},
                                                                  {"dopri853", "1e200", "3e199", "1.04e+200 rad/s"},
                                                                  {"cvodes_adams", "1e9", "3e8", "1.04e+09 rad/s"}}));
@@ -56,7 +56,7 @@ TEST_CASE("a body that turns more often than steps are allowed is refused at the
   scene.simulation.integrator.type = method;
   const SimulationResult result = run(scene);
   CHECK(result.status == SimulationStatus::not_credible);
-  CHECK_THAT(result.message, Catch::Contains("body 'block' turns at " + says) && Catch::Contains("half turn"));
+  CHECK_THAT(result.message, Catch::Contains("body 'block' turns at " + info) && Catch::Contains("half turn"));
   CHECK(result.statistics.steps == 0);
 }
 

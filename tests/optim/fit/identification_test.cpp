@@ -175,8 +175,8 @@ TEST_CASE("what validates is compared with the start, and predicted with its mea
     REQUIRE(validation.rms_scaled_at_start);
     const double rms = validation.channels[0].rms_scaled;
     CHECK((rms < *validation.rms_scaled_at_start) == same);
-    const auto says = [](const std::string& w) { return w.find("raised those that validate") != std::string::npos; };
-    CHECK(std::ranges::count_if(result.warnings, says) == (same ? 0 : 1));
+    const auto info = [](const std::string& w) { return w.find("raised those that validate") != std::string::npos; };
+    CHECK(std::ranges::count_if(result.warnings, info) == (same ? 0 : 1));
     // 95 % of 401 measurements, to three standard deviations of that share.
     CHECK(result.experiments[0].channels[0].within_prediction == Approx(0.95).margin(0.033));
     if (same) CHECK(validation.channels[0].within_prediction == Approx(0.95).margin(0.033));
