@@ -33,7 +33,7 @@ class ProgramBuilder {
   static std::vector<Program> switches_of(const Program& program);                              // program_switches.hpp
   static std::vector<SampledFunction> sampled_functions_of(const Program& program);             // sampled_functions.hpp
   static std::vector<Program> time_parts_of(const Program& program, int parameters, int time);  // time_parts.hpp
-  static std::vector<int> terms_of(const Program& part, int time);                              // time_parts.cpp
+  static std::vector<int> terms_of(const Program& part, const std::vector<double>& rates);      // time_parts.cpp
   static void ranges_of(const Program& program, std::span<const Range> x, std::vector<Range>& range);
   // Builds the first of two instructions of another program (how: name), its cosine (cos), its reciprocal (divide),
   // their difference (subtract) or the distance of the first from a number (number).

@@ -58,15 +58,15 @@ std::vector<Program> ProgramBuilder::time_parts_of(const Program& program, int p
   return found;
 }
 
-// The instructions that change with time and that sums and products alone join to the result.
-std::vector<int> ProgramBuilder::terms_of(const Program& part, int time) {
+// The instructions that change with inputs whose rate is not 0 and that sums and products alone join to the result.
+std::vector<int> ProgramBuilder::terms_of(const Program& part, const std::vector<double>& rates) {
   const std::vector<Instruction>& code = part.code_;
   std::vector<char> changes(code.size(), 0), joins(code.size(), 0);
   std::vector<int> terms;
   for (std::size_t i = 0; i < code.size(); ++i) {
     const auto [f, a, b, value] = code[i];
     changes[i] = operands(f) == 0
-                     ? f == Operation::name && a == time
+                     ? f == Operation::name && rates[static_cast<std::size_t>(a)] != 0
                      : changes[static_cast<std::size_t>(a)] || (b >= 0 && changes[static_cast<std::size_t>(b)]);
   }
   if (!code.empty()) joins.back() = 1;
@@ -88,17 +88,21 @@ std::vector<Program> time_parts_of(const Program& program, int parameters, int t
   return ProgramBuilder::time_parts_of(program, parameters, time);
 }
 
-std::vector<double> pieces_of(const Program& part, int time, std::vector<double> x, double start, double end) {
+namespace {
+
+// The inputs are x + rates t.
+std::vector<double> pieces_along(const Program& part, const std::vector<double>& x, const std::vector<double>& rates,
+                                 double start, double end) {
   struct Term {
     std::size_t at;
     Range all{INFINITY, -INFINITY, false};  // of every sample so far
     double f[kSamples] = {};
   };
   std::vector<Term> terms;
-  for (const int k : ProgramBuilder::terms_of(part, time)) terms.push_back({static_cast<std::size_t>(k)});
+  for (const int k : ProgramBuilder::terms_of(part, rates)) terms.push_back({static_cast<std::size_t>(k)});
   Program::Scratch scratch = part.scratch();
-  std::vector<Range> inputs, ranges;
-  for (const double input : x) inputs.push_back({input, input, false});
+  std::vector<double> inputs(x);
+  std::vector<Range> input_ranges(x.size()), ranges;
   const auto is_resolved = [&](Term& term) {
     const auto [low, high] = std::minmax_element(term.f, term.f + kSamples);
     if (std::none_of(term.f, term.f + kSamples, [](double f) { return std::isfinite(f); })) return true;
@@ -116,12 +120,16 @@ std::vector<double> pieces_of(const Program& part, int time, std::vector<double>
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     const double t0 = pieces[k].low, t1 = pieces[k].high;
     for (int j = 0; j < kSamples; ++j) {
-      x[static_cast<std::size_t>(time)] = t0 + (t1 - t0) * j / (kSamples - 1);
-      part.value(x, scratch);
+      const double t = t0 + (t1 - t0) * j / (kSamples - 1);
+      for (std::size_t i = 0; i < x.size(); ++i) inputs[i] = x[i] + rates[i] * t;
+      part.value(inputs, scratch);
       for (Term& term : terms) term.f[j] = scratch.value[term.at];
     }
-    inputs[static_cast<std::size_t>(time)] = {t0, t1, false};
-    ranges_of(part, inputs, ranges);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const auto [low, high] = std::minmax({x[i] + rates[i] * t0, x[i] + rates[i] * t1});
+      input_ranges[i] = {low, high, false};
+    }
+    ranges_of(part, input_ranges, ranges);
     bool resolved = true;
     for (Term& term : terms) resolved = is_resolved(term) && resolved;
     if (resolved || t1 - t0 <= kNarrow * (end - start) || pieces.size() >= kMostPieces) {
@@ -133,6 +141,21 @@ std::vector<double> pieces_of(const Program& part, int time, std::vector<double>
   }
   std::sort(instants.begin(), instants.end());
   return instants;
+}
+
+}  // namespace
+
+std::vector<double> pieces_of(const Program& part, int time, std::vector<double> x, double start, double end) {
+  std::vector<double> rates(x.size(), 0.0);
+  x[static_cast<std::size_t>(time)] = 0, rates[static_cast<std::size_t>(time)] = 1;
+  return pieces_along(part, x, rates, start, end);
+}
+
+std::vector<double> pieces_between(const Program& part, const std::vector<double>& from,
+                                   const std::vector<double>& to) {
+  std::vector<double> rates;
+  for (std::size_t i = 0; i < from.size(); ++i) rates.push_back(to[i] - from[i]);
+  return pieces_along(part, from, rates, 0, 1);
 }
 
 // Between two pieces of ordinary width a jump keeps its size down to two neighbouring numbers.

@@ -20,6 +20,8 @@ std::vector<Program> time_parts_of(const Program& program, int parameters, int t
 
 // x: the inputs of the part; that of time is overwritten. Returns start, the instants between, end.
 std::vector<double> pieces_of(const Program& part, int time, std::vector<double> x, double start, double end);
+// The same as parts of the way, 0 to 1, along which all inputs change evenly.
+std::vector<double> pieces_between(const Program& part, const std::vector<double>& from, const std::vector<double>& to);
 // The instants, of those pieces, at which the part jumps.
 std::vector<double> jumps_of(const Program& part, int time, std::vector<double> x, const std::vector<double>& pieces);
 

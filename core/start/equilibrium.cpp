@@ -10,6 +10,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
+#include "core/expression/time_parts.hpp"
 #include "core/force/forces.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/followed_angles.hpp"
@@ -26,6 +27,7 @@ using Eigen::VectorXd;
 constexpr int kMostIterations = 5000;        // chains that slide along stiff stops take some hundreds
 constexpr double kLargestStep = 0.2;         // of a coordinate at once [lengths of the mechanism, rad]
 constexpr double kApart = 0.05;              // the places along a step at which forces are computed [the same]
+constexpr double kNearPlaces = 1e-3;         // of a step: places as near to each other are one
 constexpr double kBeside = 1e-5;             // from the equilibrium, to see where the forces drive it [the same]
 constexpr double kAtKink = 1e-7;             // an equilibrium as near to a kink is at it [the same]
 constexpr double kLeastKink = 1e-6;          // of the change of forces over this distance, whose rounding is 1e-8
@@ -39,7 +41,8 @@ constexpr double kFastest = 0.02;            // of sigma: its largest change fro
 class Statics {
  public:
   Statics(const Mechanism& mechanism, double t, const VectorXd& q_guess, const VectorXd& angles)
-      : d_(mechanism.data()),
+      : mechanism_(mechanism),
+        d_(mechanism.data()),
         t_(t),
         layout_{d_.n},
         dynamics_(mechanism, FormulationSettings{}),
@@ -139,6 +142,45 @@ class Statics {
   const VectorXd& angles() const { return angles_; }
   void set_angles(const VectorXd& angles) { angles_ = angles; }
 
+  // The parts, 0 to 1, of the way from q to q + change between which laws of forces have no pulse, step or kink, as far
+  // as what they read changes evenly.
+  std::vector<double> places_of_laws(const VectorXd& q, const VectorXd& change) {
+    const std::size_t P = static_cast<std::size_t>(d_.rho.size());
+    const VectorXd ends[2] = {at_rest_in(q), at_rest_in(q + change)};
+    std::vector<double> places, inputs[2];
+    const auto add = [&](const Program& law) {
+      if (inputs[0] == inputs[1]) return;
+      const std::vector<double> pieces = pieces_between(law, inputs[0], inputs[1]);
+      places.insert(places.end(), pieces.begin(), pieces.end());
+    };
+    d_.forces->for_each([&]<class Kind>(const Kind& f, ForcePlace) {
+      if constexpr (HasLaw<Kind>) {
+        if (!f.law.program) return;
+        const auto [i, j] = f.bodies();
+        for (const int end : {0, 1}) {
+          const auto [x, xdot] = f.measured(angles_, body_at(ends[end], i).frame, body_at(ends[end], j).frame);
+          inputs[end].assign(d_.rho.begin(), d_.rho.end());
+          inputs[end].insert(inputs[end].end(), {x, 0.0, t_});
+        }
+        add(*f.law.program);
+      }
+    });
+    for (const AppliedForce& f : d_.applied) {
+      for (const Program& component : f.components) {
+        for (const int end : {0, 1}) {
+          inputs[end].assign(d_.rho.begin(), d_.rho.end());
+          inputs[end].resize(P + 1 + static_cast<std::size_t>(mechanism_.sensors()), t_);
+          for (const int input : component.used_inputs())
+            if (const int sensor = input - static_cast<int>(P) - 1; sensor >= 0)
+              inputs[end][static_cast<std::size_t>(input)] =
+                  mechanism_.sensor_value(sensor, {t_, ends[end], angles_, nullptr});
+        }
+        add(component);
+      }
+    }
+    return places;
+  }
+
   // Does evaluate() at q moved by xi.
   bool evaluate_beside(const VectorXd& q, const VectorXd& xi) {
     const VectorXd angles = angles_;
@@ -197,6 +239,7 @@ class Statics {
     return length > 0 ? length : 1;
   }
 
+  const Mechanism& mechanism_;
   const MechanismData& d_;
   double t_;
   const StateLayout layout_;
@@ -246,9 +289,14 @@ double error_along(Statics& statics, const FreeMotion& free, const OrthogonalDec
   const MatrixXd direction = rates_of_poses(from, free.N * y);
   const double size = statics.size_of(free.N * y);
   const int parts = 1 + static_cast<int>(size / kApart);
-  double error = 0;
-  for (int k = 1; k <= parts && error < kLargestError; ++k) {
-    const double c = static_cast<double>(k) / parts;
+  std::vector<double> places = statics.places_of_laws(from, direction);
+  for (int k = 1; k <= parts; ++k) places.push_back(static_cast<double>(k) / parts);
+  std::ranges::sort(places);
+  double error = 0, last = 0;
+  for (const double c : places) {
+    if (error >= kLargestError) break;
+    if (c < last + kNearPlaces && !(c == 1 && last < 1)) continue;
+    last = c;
     q = from + c * direction;
     if (!statics.settle(q) || !statics.evaluate(q)) return INFINITY;
     const VectorXd difference = free.NM * statics.z() - free.force + c * change;

@@ -306,6 +306,34 @@ TEST_CASE("an arm rests in the first of several wells on its way", "[equilibrium
   CHECK(8 * x * std::exp(-x * x) == Approx(-0.3 * 9.81 * std::cos(angle)).epsilon(1e-8));
 }
 
+TEST_CASE("a narrow catch on a way of constant force is not passed over", "[equilibrium]") {
+  // 3 kg slide down a rail; a catch of twice 4 mm holds them at 0.7 m, or a smooth one of 3 mm. Below is a stop.
+  const bool smooth = GENERATE(false, true);
+  const double from = GENERATE(0.0, 0.61);
+  Scene s;
+  s.bodies.push_back(plain_body("ram", 3, {1.0, 1.0, 1.0, 0.0, 0.0, 0.0}, vec("0", "0", Expression(-from).text())));
+  Joint rail;
+  rail.name = "rail", rail.type = "translational", rail.body2 = "ram";
+  rail.axis1 = vec("0", "0", "-1"), rail.axis2 = vec("0", "0", "-1");
+  s.joints.push_back(rail);
+  Sensor down;
+  down.name = "down", down.quantity = "displacement", down.joint = "rail";
+  s.sensors.push_back(down);
+  const std::string held = smooth ? "200*exp(-((down - 0.7)/0.003)^2)" : "80*max(0, 1 - abs(down - 0.7)/0.004)";
+  PointForce force;
+  force.body = "ram";
+  force.components = {f("0"), f("0"), f(held + " + 1e5*max(0, down - 2)")};
+  s.forces.push_back({"catch", force});
+  s.equilibrium = true;
+  const Mechanism mechanism(s, nominal(s));
+  const Assembly assembly(mechanism, 0);
+  INFO(assembly.result().message);
+  REQUIRE(assembly.result().ok);
+  const double weight = 3 * 9.81;
+  const double rest = smooth ? 0.7 - 0.003 * std::sqrt(std::log(200 / weight)) : 0.7 - 0.004 * (1 - weight / 80);
+  CHECK(-assembly.result().y(2) == Approx(rest).epsilon(1e-10));
+}
+
 TEST_CASE("a kink of a force exactly at the equilibrium is named, and no other", "[equilibrium]") {
   // The spring holds m = 1 kg at angle 0, where its slope changes from 10 to 20 N m/rad.
   const std::string law = "table(angle, [-1, 0, 1], [-12.943, -2.943, 17.057])";
