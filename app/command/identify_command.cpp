@@ -238,7 +238,7 @@ SimulatedExperiment simulate_first_experiment(Run& run, const Problem& needed, c
   SimulatedExperiment experiment = simulated_experiment(run, simulated_scene(needed, data));
   const SimulationResult& first = experiment.simulation;
   run.result["simulation"] = to_json(first.statistics);
-  if (first.ok()) run.warn(simulation_warnings(experiment.scene, first.statistics));
+  if (first.ok()) run.warn(simulation_warnings(experiment.scene, experiment.scene.simulation, first.statistics));
   warn_of_stiffness(run, first.statistics, true);
   return experiment;
 }

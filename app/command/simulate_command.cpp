@@ -49,7 +49,7 @@ int simulate_command(const CommandContext& context) {
     if (!simulation.ok()) simulated.simulation.end_time = simulation.last_good_time;
     print_simulation(context.out, simulated, simulation.statistics);
     write_trajectory(run, motion.trajectory, simulation.statistics.singular);
-    run.warn(simulation_warnings(scene, simulation.statistics, simulation.ok()));
+    run.warn(simulation_warnings(scene, scene.simulation, simulation.statistics, simulation.ok()));
     warn_of_stiffness(run, simulation.statistics, false);
   }
   if (simulation.ok()) {

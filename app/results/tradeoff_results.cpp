@@ -189,7 +189,8 @@ void add_given_settings(Run& run, const Tradeoff& tradeoff) {
   run.context.out << "\nerrors\n" << table.text();
   if (is_default && tradeoff.own) run.context.out << "the file's settings are the defaults\n";
   if (!tradeoff.own || !tradeoff.rows[*tradeoff.own].ok()) return;
-  for (const std::string& warning : simulation_warnings(run.problem.scene, tradeoff.rows[*tradeoff.own].statistics))
+  for (const std::string& warning :
+       simulation_warnings(run.problem.scene, run.problem.scene.simulation, tradeoff.rows[*tradeoff.own].statistics))
     run.warn("as in the file: " + warning);
 }
 

@@ -117,7 +117,7 @@ Warning unresolved(const SimulationSettings& settings, bool solved, const Quadra
       "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
       "{:.6g} s. {}To resolve {}, {}{}",
       what, worst.of, consequence, 100 * worst.error, worst.time, first, what,
-      solved                     ? "tighten simulation.integrator.rtol and atol"
+      solved                     ? "set simulation.integrator.max_step, or tighten rtol and atol"
       : settings.integrator.step ? "take a smaller simulation.integrator.step"
                                  : "set simulation.integrator.max_step, tighten rtol",
       solved ? "" : kCvodes);
@@ -171,9 +171,8 @@ std::string in_words(const Scene& scene, const Jump& jump) {
       what, jump.size, jump.t, causes);
 }
 
-std::vector<std::string> simulation_warnings(const Scene& scene, const SimulationStatistics& statistics,
-                                             bool finished) {
-  const SimulationSettings& settings = scene.simulation;
+std::vector<std::string> simulation_warnings(const Scene& scene, const SimulationSettings& settings,
+                                             const SimulationStatistics& statistics, bool finished) {
   std::vector<std::string> warnings;
   const auto add = [&](std::optional<std::string> warning) {
     if (warning) warnings.push_back(std::move(*warning));

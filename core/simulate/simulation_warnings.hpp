@@ -13,8 +13,9 @@ namespace mbsopt {
 // "the law of force 's1' jumps by 2 at t = 0.5 s, an instant that depends on 'tp': ..."; scene is the simulated scene.
 std::string in_words(const Scene& scene, const Jump& jump);
 
-// finished: the run reached its end, so the caller uses its numbers.
-std::vector<std::string> simulation_warnings(const Scene& scene, const SimulationStatistics& statistics,
-                                             bool finished = true);
+// settings: those of the run, which may be by CVODES where the scene's are not. finished: the run reached its end, so
+// the caller uses its numbers.
+std::vector<std::string> simulation_warnings(const Scene& scene, const SimulationSettings& settings,
+                                             const SimulationStatistics& statistics, bool finished = true);
 
 }  // namespace mbsopt

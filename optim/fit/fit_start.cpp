@@ -87,7 +87,7 @@ FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data,
   if (!stacked(found, comparison.f, comparison.f_rho)) return start;
   Scene scene = problem.scene;
   scene.simulation = {};  // whose other warnings are said elsewhere
-  std::vector<std::string> said = simulation_warnings(scene, statistics);
+  std::vector<std::string> said = simulation_warnings(scene, scene.simulation, statistics);
 
   for (std::size_t k = 0; k < unknowns.size(); ++k)
     comparison.variables.push_back(compared_variable(names[k], unknowns[k].description));

@@ -170,7 +170,7 @@ bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* fr
     return false;
   }
   e.statistics = result.statistics;
-  if (!frozen) e.warnings = simulation_warnings(scene_, result.statistics, result.ok());
+  if (!frozen) e.warnings = simulation_warnings(scene_, settings, result.statistics, result.ok());
   e.steps = std::move(result.steps);
   e.message = result.message;
   if (result.ok()) take(result, !frozen, e);

@@ -53,7 +53,7 @@ Run run_of(const Scene& scene, std::shared_ptr<const PointCost> at_end = std::ma
   const SimulationResult adjoint = simulate_adjoint(mechanism, scene.simulation, costs, {});
   INFO(tlm.message << adjoint.message);
   REQUIRE((tlm.ok() && adjoint.ok()));
-  CHECK(simulation_warnings(scene, tlm.statistics, true).empty());
+  CHECK(simulation_warnings(scene, scene.simulation, tlm.statistics, true).empty());
   CHECK(simulate(mechanism, scene.simulation, costs, {}, {}).psi(0) == Approx(tlm.psi(0)).epsilon(1e-9));
   return {tlm.psi(0), tlm.psi_rho(0, 0), adjoint.psi_rho(0, 0)};
 }
@@ -161,7 +161,7 @@ TEST_CASE("fixed steps that pass over a blow name it", "[pulses]") {
     scene.simulation.integrator.step = step;
     const SimulationResult result = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
     REQUIRE(result.ok());
-    return simulation_warnings(scene, result.statistics, true);
+    return simulation_warnings(scene, scene.simulation, result.statistics, true);
   };
   const std::vector<std::string> found = warnings(0.05);
   REQUIRE(found.size() == 1);

@@ -28,7 +28,7 @@ std::vector<std::string> warnings(const Scene& scene) {
   const SimulationResult run = simulate_tlm(mechanism, scene.simulation);
   INFO(run.message);
   REQUIRE(run.ok());
-  return simulation_warnings(scene, run.statistics);
+  return simulation_warnings(scene, scene.simulation, run.statistics);
 }
 
 Scene with_law(Scene s, const std::string& law) {
@@ -135,6 +135,6 @@ TEST_CASE("a kink that the motion crosses is noted with its instant, and smooth 
     CHECK(run.statistics.jumps[0].size == 0);
     CHECK(run.statistics.jumps[0].motion);
     CHECK(run.statistics.jumps[0].t == Approx(0.4).epsilon(1e-4));  // found on the dense output of the step across it
-    CHECK(simulation_warnings(s, run.statistics).empty());
+    CHECK(simulation_warnings(s, s.simulation, run.statistics).empty());
   }
 }

@@ -38,7 +38,7 @@ Scene bar_on_two_hinges(const std::string& angle) {
 bool warned(const Scene& scene) {
   const Mechanism mechanism(scene, nominal(scene));
   const SimulationResult result = simulate(mechanism, scene.simulation);
-  for (const std::string& warning : simulation_warnings(scene, result.statistics)) {
+  for (const std::string& warning : simulation_warnings(scene, scene.simulation, result.statistics)) {
     if (warning.find("simulation.formulation.alpha") != std::string::npos) return true;
   }
   return false;
