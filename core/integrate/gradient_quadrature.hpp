@@ -22,7 +22,7 @@ class GradientQuadrature {
   // y_bar, rho_bar: weight times the gradient; ydot: at the node (Method::nodes).
   void take(std::size_t cost, int node, double weight, VecIn y_bar, VecIn ydot, VecIn rho_bar);
   void end_step(const Step& step);  // after all of its nodes, in any order of steps
-  void add_to(SimulationStatistics& statistics) const { watch_.add_to(statistics); }
+  void add_to(SimulationStatistics& statistics);
 
  private:
   const Mechanism mechanism_;
@@ -30,6 +30,9 @@ class GradientQuadrature {
   std::size_t nodes_;
   QuadratureWatch watch_;
   std::vector<double> along_motion_, along_parameters_;  // g_y ydot, g_rho rho at each node of each cost
+  // The state may rest after a blow that its derivatives outlast: int |g_y|, per cost, counts by the fastest ydot.
+  Eigen::MatrixXd influence_;
+  Eigen::VectorXd fastest_;
 };
 
 }  // namespace mbsopt

@@ -119,6 +119,11 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
   return step.t + at * h;
 }
 
+void QuadratureWatch::count_at_least(std::size_t cost, Integrand what, double size) {
+  double& of_size = integrals_[kIntegrals * cost + static_cast<std::size_t>(what)].of_size;
+  of_size = std::max(of_size, size);
+}
+
 void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
   // Errors up to `rounding` have no meaning.
   const auto judge = [](const Integral& i, double of_size, double rounding, const Cost& cost, QuadratureError& worst) {

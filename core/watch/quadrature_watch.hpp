@@ -46,6 +46,8 @@ class QuadratureWatch {
   // end the run, in words, or an empty string.
   std::string look_at(const Step& step, std::size_t cost, std::span<const double> g, Integrand what = Integrand::value);
 
+  // The integral counts as one of this size, if it is smaller.
+  void count_at_least(std::size_t cost, Integrand what, double size);
   void add_to(SimulationStatistics& statistics) const;
 
  private:
