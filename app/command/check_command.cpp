@@ -12,6 +12,7 @@
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/check/gradient_check.hpp"
+#include "optim/objective/objective_run.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt::inline app {
@@ -224,6 +225,7 @@ int check_command(const CommandContext& context) {
   const Evaluator evaluator(needed.scene, objectives_of(needed));
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);
+  run.warn(missed_peaks(evaluator.objectives(), check.psi, true_values));
   const ObjectiveUnits units = objective_units(run.problem);
   add_units(run.result, units);
   print_simulation(context.out, scene, check.statistics);

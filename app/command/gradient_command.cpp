@@ -18,6 +18,7 @@
 #include "optim/objective/evaluator.hpp"
 #include "optim/objective/gradient_doubts.hpp"
 #include "optim/objective/hessian.hpp"
+#include "optim/objective/objective_run.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt::inline app {
@@ -182,7 +183,9 @@ int gradient_command(const CommandContext& context) {
   warn_of_stiffness(run, evaluation.statistics, true);
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);
-  add_objectives(run, evaluation, evaluator.true_values(evaluator.start()));
+  const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
+  add_objectives(run, evaluation, true_values);
+  run.warn(missed_peaks(evaluator.objectives(), evaluation.psi, true_values));
   add_cases(run, true, options.method);
   if (context.options.hessian) add_second_derivatives(run, evaluator);
   run.write("report.html", gradient_report(scene, run.result));

@@ -117,6 +117,8 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   for (std::size_t i = 0; i < objectives.size(); ++i) {
     motion.psi(static_cast<Eigen::Index>(i)) += objectives[i].parameters_only(rho);
   }
+  for (std::string& words : missed_peaks(objectives, motion.psi, motion.true_values))
+    motion.warnings.push_back(std::move(words));
   return motion;
 }
 

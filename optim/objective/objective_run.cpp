@@ -199,4 +199,21 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
   return values;
 }
 
+std::vector<std::string> missed_peaks(const std::vector<Objective>& objectives, const Eigen::VectorXd& psi,
+                                      const std::vector<std::optional<double>>& true_values) {
+  constexpr double kShortest = 25;  // d: a peak of 1e-11 of the run is none
+  std::vector<std::string> sentences;
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    if (!true_values[i]) continue;
+    const double value = psi(static_cast<Eigen::Index>(i)), k = std::abs(objectives[i].exponent({1}));
+    if (!(k * std::abs(*true_values[i] - value) > kShortest)) continue;
+    sentences.push_back(fmt::format(
+        "the value of objective '{}', {:.6g}, and its gradient leave out a peak: the true extreme is {:.6g}. The "
+        "instants at which the run is looked at pass over it: set simulation.integrator.max_step to a part of its "
+        "duration",
+        objectives[i].name(), value, *true_values[i]));
+  }
+  return sentences;
+}
+
 }  // namespace mbsopt::inline optim

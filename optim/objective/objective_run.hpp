@@ -55,4 +55,9 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
                                                  const StepSequence& steps,
                                                  const std::function<bool(double t)>& progress = {});
 
+// Sentences on smooth extremes that leave out a peak which the true extreme shows. One of the exponent k that lasts the
+// part e^-d of the run is lower by d/k.
+std::vector<std::string> missed_peaks(const std::vector<Objective>& objectives, const Eigen::VectorXd& psi,
+                                      const std::vector<std::optional<double>>& true_values);
+
 }  // namespace mbsopt::inline optim

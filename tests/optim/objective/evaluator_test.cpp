@@ -8,10 +8,14 @@
 #include "core/force/user_force.hpp"
 #include "core/tableau/tableaus.hpp"
 #include "optim/check/gradient_check.hpp"
+#include "optim/objective/objective_run.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
 #include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
 using Catch::Contains;
+using testing::f;
+using testing::vec;
 
 namespace {
 
@@ -48,6 +52,17 @@ Problem with_idle_parameter() {
 }
 
 }  // namespace
+
+TEST_CASE("drift of CVODES within its tolerance is no contradiction of joints", "[gradient][cvodes]") {
+  const Problem problem = five_bar::problem(1e-8);
+  EvaluatorOptions options;
+  options.method = GENERATE(GradientMethod::cvodes_forward, GradientMethod::cvodes_adjoint);
+  Evaluator evaluator(problem.scene, objectives_of(problem), {"k1"}, options);
+  const Evaluation& e = evaluator.gradients(evaluator.start());
+  INFO(e.message);
+  REQUIRE(e.ok);
+  CHECK(e.warnings == std::vector<std::string>());
+}
 
 TEST_CASE("a parameter that nothing uses is an error in C++, too", "[gradient]") {
   Problem problem = with_idle_parameter();
@@ -129,6 +144,56 @@ TEST_CASE("an evaluation warns of a running cost that jumps with the motion, by 
   REQUIRE(e.ok);
   REQUIRE(e.warnings.size() >= 1);
   CHECK_THAT(e.warnings.back(), Contains("the integrand of objective '" + problem.objectives[0].name + "' jumps by 2"));
+}
+
+TEST_CASE("the gradient of a maximum is resolved although the motion rests after a short blow", "[gradient]") {
+  Scene scene;  // 14 N m for 20 ms turn the wheel at 0.28/J = 0.4 rad/s from 1 s on
+  testing::add_parameters(scene, {{"J", 0.7}});
+  scene.gravity = {0.0, 0.0, 0.0};
+  scene.bodies.push_back(testing::plain_body("wheel", 1, {f("J"), f("J"), f("J"), 0.0, 0.0, 0.0}, vec("0", "0", "0")));
+  scene.joints.push_back(testing::hinge("hub", "ground", vec("0", "0", "0"), "wheel", vec("0", "0", "0")));
+  Signal blow;
+  blow.name = "blow", blow.interpolation = Interpolation::hold;
+  const std::vector<double> t{0, 1, 1.02, 12}, moment{0, 14, 0, 0};
+  blow.curve = std::make_shared<const Curve>(Interpolation::hold, t, moment);
+  scene.signals = {blow};
+  scene.forces.push_back({"hit", Torque{"wheel", {f("0"), f("0"), f("blow")}}});
+  Sensor rate;
+  rate.name = "rate", rate.quantity = "rate", rate.joint = "hub";
+  scene.sensors.push_back(rate);
+  scene.simulation.end_time = 12;
+  ObjectiveSpec fastest;
+  fastest.name = "fastest", fastest.means[0] = f("rate");
+  Evaluator evaluator(scene, {Objective(scene, fastest)});
+  const Evaluation& e = evaluator.gradients(evaluator.start());
+  INFO(e.message);
+  REQUIRE(e.ok);
+  CHECK(e.psi_rho(0, 0) == Approx(-0.4 / 0.7).epsilon(2e-3));
+  CHECK(e.warnings == std::vector<std::string>());
+}
+
+TEST_CASE("a peak that a solved run passes over is said", "[gradient]") {
+  Scene scene;
+  testing::add_parameters(scene, {{"A", 0.4}});
+  scene.gravity = {0.0, 0.0, 0.0};
+  scene.bodies.push_back(testing::plain_body("wheel", 1, {1.0, 1.0, 1.0, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
+  scene.joints.push_back(testing::hinge("hub", "ground", vec("0", "0", "0"), "wheel", vec("0", "0", "0")));
+  scene.sensors.push_back(testing::angle_sensor("angle", "hub"));
+  scene.drives = {{"motor", "angle", "", "", "hub", "ground", "", "O", "O", f("A*sin(3*t)"), {}}};
+  scene.simulation.end_time = 3;
+  ObjectiveSpec peak;
+  peak.name = "peak";
+  const auto said = [&](double width) {
+    peak.means[0] = f("exp(-((angle - 0.23)/" + Expression(width).text() + ")^2)");
+    Evaluator evaluator(scene, {Objective(scene, peak)});
+    const Evaluation e = evaluator.values(evaluator.start());
+    REQUIRE(e.ok);
+    return missed_peaks(evaluator.objectives(), e.psi, evaluator.true_values(evaluator.start()));
+  };
+  CHECK(said(0.1).empty());
+  const std::vector<std::string> narrow = said(1e-3);
+  REQUIRE(narrow.size() == 1);
+  CHECK_THAT(narrow[0], Contains("'peak'") && Contains("the true extreme is 1") && Contains("max_step"));
 }
 
 TEST_CASE("the derivative of a root through zero is watched, though the root itself is resolved", "[gradient]") {
