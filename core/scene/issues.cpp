@@ -267,23 +267,33 @@ void check_units(Checker& checker, const SampleColumn& samples) {
   check("time_unit", samples.time_unit, dimension::kTime);
 }
 
+namespace {
+
+// Warns of samples of an angle that are not counted over turns.
+void check_turns(Checker& checker, const SampleColumn& samples, const std::string& path) {
+  if (!samples.curve) return;
+  const std::optional<Unit> unit = parse_unit(samples.unit);
+  const std::vector<double>& values = samples.curve->y();
+  const bool in_rad = unit && unit->dimension == dimension::kAngle;
+  std::size_t wrap = first_wrap(values, 2 * std::numbers::pi);
+  const bool in_degrees = wrap == 0 && !in_rad && (wrap = first_wrap(values, 360)) > 0;
+  if (wrap == 0) return;
+  checker.warning(path, "'" + samples.column + "' jumps from " + text_of(values[wrap - 1]) + " to " +
+                            text_of(values[wrap]) + " at " + text_of(samples.curve->x()[wrap]) + " s, by about a turn" +
+                            (in_degrees ? " in degrees, where rad are expected" : "") +
+                            ": the motion turns back there. Take whole turns out of the column, so that it goes on "
+                            "counting");
+}
+
+}  // namespace
+
 void check_quantity(Checker& checker, const SampleColumn& samples, const Dimension& quantity) {
   const std::optional<Unit> unit = parse_unit(samples.unit);
   if (!samples.unit.empty() && unit && !unit->dimension.is_none() && !compatible(unit->dimension, quantity))
     return checker.issue(checker.path("column"), "'" + samples.column + "' is in " + to_string(unit->dimension) +
                                                      "; expected is " +
                                                      (quantity.is_none() ? "a number" : to_string(quantity)));
-  if (quantity != dimension::kAngle || !samples.curve) return;
-  const std::vector<double>& values = samples.curve->y();
-  const bool in_rad = unit && unit->dimension == quantity;
-  std::size_t wrap = first_wrap(values, 2 * std::numbers::pi);
-  const bool in_degrees = wrap == 0 && !in_rad && (wrap = first_wrap(values, 360)) > 0;
-  if (wrap == 0) return;
-  checker.warning(checker.path("column"),
-                  "'" + samples.column + "' jumps from " + text_of(values[wrap - 1]) + " to " + text_of(values[wrap]) +
-                      " at " + text_of(samples.curve->x()[wrap]) + " s, by about a turn" +
-                      (in_degrees ? " in degrees, where rad are expected" : "") +
-                      ": the motion turns back there. Take whole turns out of the column, so that it goes on counting");
+  if (quantity == dimension::kAngle) check_turns(checker, samples, checker.path("column"));
 }
 
 void check_meaning(Checker& checker, const SampledLaw& law) { check_units(checker, law); }
@@ -313,6 +323,9 @@ void check_smooth(Checker& checker, const Expression& law) {
 
 void check_meaning(Checker& checker, const Drive& drive) {
   check_smooth(checker, drive.law);
+  for (const Signal& signal : checker.facts().scene().signals)
+    if (drive.type == "angle" && signal.unit.empty() && drive.law.depends_on(signal.name))
+      check_turns(checker, signal, checker.path("law"));
   if (!drive.samples) check_start(checker, checker.path("law"), drive.law, 2);
   if (drive.type == "angle" || drive.type == "displacement") check_joint_has(checker, "joint", drive.joint, drive.type);
   if (drive.type == "distance") check_two_bodies(checker, drive.body1, drive.body2, "a distance");

@@ -27,15 +27,21 @@ void add_signals(Symbols& symbols, const Scene& scene) {
 
 std::size_t first_wrap(const std::vector<double>& values, double turn) {
   constexpr double kAbout = 0.1, kUnusual = 5;  // of a turn; of the median step
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(std::abs(values[i] - values[i - 1]));
+  constexpr double kAgainst = 2.5;              // of the median step, where it goes against the steps beside it
+  std::vector<double> steps, sizes;
+  for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(values[i] - values[i - 1]);
   if (steps.size() < 2) return 0;
-  std::vector<double> sorted = steps;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::ranges::nth_element(sorted, middle);
-  const auto wrap = std::ranges::find_if(
-      steps, [&](double step) { return std::abs(step - turn) < kAbout * turn && step > kUnusual * *middle; });
-  return wrap == steps.end() ? 0 : static_cast<std::size_t>(wrap - steps.begin()) + 1;
+  for (const double step : steps) sizes.push_back(std::abs(step));
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::ranges::nth_element(sizes, middle);
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const double size = std::abs(steps[i]), off = std::abs(size - turn);
+    const double beside = steps[i == 0 ? 1 : i - 1];
+    // With few samples per turn a wrap is a turn less the step of the motion, which goes the other way.
+    const bool against = steps[i] * beside < 0 && off < kAbout * turn + 1.5 * *middle && size > kAgainst * *middle;
+    if (against || (off < kAbout * turn && size > kUnusual * *middle)) return i + 1;
+  }
+  return 0;
 }
 
 Covered covered_by(const Curve& samples, double delay) {

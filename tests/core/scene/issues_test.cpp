@@ -311,6 +311,24 @@ TEST_CASE("samples of a drive are in its unit, and an angle goes on over turns",
   CHECK_THAT(issue("rad", wrapped, "angle"), Catch::Contains("jumps from 3 to -2.8 at 0.75 s, by about a turn"));
   CHECK(issue("m", wrapped, "displacement").empty());
   CHECK_THAT(issue("", {340, 350, 1, 11, 21, 30}, "angle"), Catch::Contains("in degrees"));
+  // With few samples per turn a wrap is shorter than a turn by the step of the motion.
+  CHECK_THAT(issue("", {20, 100, 180, 260, 340, 60, 140}, "angle"), Catch::Contains("jumps from 340 to 60"));
+  CHECK_THAT(issue("rad", {5.5, 4.1, 2.7, 1.3, 6.18, 4.78, 3.38}, "angle"), Catch::Contains("jumps from 1.3 to 6.18"));
+  CHECK(issue("rad", {0, 1.4, 2.8, 4.2, 2.8, 1.4, 0}, "angle").empty());
+}
+
+TEST_CASE("a signal that a drive follows as an angle goes on over turns", "[scene]") {
+  Scene scene = hinged_rod();
+  Signal signal;
+  signal.name = "encoder", signal.column = "enc", signal.interpolation = Interpolation::spline;
+  const std::vector<double> t{0, 0.1, 0.2, 0.3, 0.4, 0.5}, y{4, 5, 6, 0.717, 1.717, 2.717};
+  signal.curve = std::make_shared<const Curve>(Interpolation::spline, t, y);
+  scene.signals = {signal};
+  scene.joints[0].type = "cylindrical";
+  scene.drives = {{"turn", "angle", "", "", "pin", "ground", "", "O", "O", Expression::parse("0.2 + encoder"), {}}};
+  CHECK_THAT(at(scene, "drives[0].law"), Catch::Contains("'enc' jumps from 6 to 0.717 at 0.3 s"));
+  scene.drives[0].type = "displacement";
+  CHECK(at(scene, "drives[0].law").empty());
 }
 
 TEST_CASE("sensors that are expressions are checked", "[scene]") {
