@@ -283,8 +283,10 @@ template <class Integer>
 void FieldReader::read_integer(const Node& node, const std::string& path, Integer& value) {
   double given = 0;
   if (!read_plain(node, path, given, Dimension{})) return;
-  if (given != std::round(given) || std::abs(given) > static_cast<double>(std::numeric_limits<Integer>::max() / 2)) {
-    findings_.add(node, path, "must be a whole number, found " + Expression(given).text());
+  const bool is_whole = given == std::round(given);
+  if (!is_whole || std::abs(given) > static_cast<double>(std::numeric_limits<Integer>::max() / 2)) {
+    const char* const wanted = is_whole ? "is too large, " : "must be a whole number, found ";
+    findings_.add(node, path, wanted + Expression(given).text());
     return;
   }
   value = static_cast<Integer>(given);

@@ -118,7 +118,8 @@ std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& 
   for (const NamedFiles& named : named_files(problem)) {
     Json moved = Json::array();
     for (const std::string& file : named.files)
-      moved.push_back(std::filesystem::relative(file, std::filesystem::canonical(run.folder.path())).generic_string());
+      moved.push_back(
+          std::filesystem::relative(file, std::filesystem::weakly_canonical(run.folder.path())).generic_string());
     text = with_value(text, named.path, json_text(named.is_list ? moved : moved[0]));
   }
   for (std::size_t i = 0; i < poses.size(); ++i) {

@@ -173,6 +173,7 @@ void describe_unmoved(const Problem& problem, const Eigen::VectorXd& before, Des
   describe_given(problem, before, design);
   design.objective_final = design.objective_initial;
   for (DesignConstraint& c : design.constraints) c.value = c.initial;
+  for (DesignCase& c : design.cases) c.value = c.initial;
 }
 
 // The problem must have its seeds.
