@@ -80,8 +80,7 @@ void HtmlPage::table(const std::vector<std::string>& header, const std::vector<T
 }
 
 void HtmlPage::plot(const LinePlot& plot) {
-  body_ += fmt::format("<figure data-plot=\"{}\">{}</figure>\n", plots_.size(), to_svg(plot));
-  plots_.push_back(plot_data(plot, arrays_));
+  body_ += fmt::format("<figure data-plot=\"{}\">{}</figure>\n", html_escaped(plot_data(plot)), to_svg(plot));
 }
 
 void HtmlPage::begin_choices(const std::vector<std::string>& names) {
@@ -114,10 +113,10 @@ std::string HtmlPage::text() const {
       "content=\"light dark\">\n<title>{0}</title><style>{1}</style></head>\n<body>\n"
       "<nav aria-label=\"Contents\">{2}</nav>\n<main>\n<h1>{0}</h1>\n{3}</main>\n"
       "<script type=\"application/json\" "
-      "id=\"data\">{{\"arrays\":{4},\n\"plots\":[{5}],\n\"motions\":[{6}],\n\"runs\":{8}}}</script>\n"
-      "<script>{7}</script>\n</body></html>\n",
-      html_escaped(title_), kReportStyle, contents, body_, arrays_.text(), fmt::join(plots_, ",\n"),
-      fmt::join(motions_, ",\n"), kReportScript, compared_);
+      "id=\"data\">{{\"arrays\":{4},\n\"motions\":[{5}],\n\"runs\":{7}}}</script>\n"
+      "<script>{6}</script>\n</body></html>\n",
+      html_escaped(title_), kReportStyle, contents, body_, arrays_.text(), fmt::join(motions_, ",\n"), kReportScript,
+      compared_);
 }
 
 }  // namespace mbsopt::inline app

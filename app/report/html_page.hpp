@@ -2,8 +2,8 @@
 // its contents at the side, and is fit for print. It loads nothing from the network and has no time stamp.
 //
 // The page shows everything without scripts. Its script (script/*.js) adds functions. Plots get the values under the
-// pointer, zoom and legends that hide. A mechanism gets its motion, and tables a copy as CSV. The script reads the data
-// of plots and motions from one block of JSON, which holds equal arrays once.
+// pointer, zoom and legends that hide. A mechanism gets its motion, and tables a copy as CSV. The script reads the
+// values of a plot from its drawing, and motions from one block of JSON, which holds equal arrays once.
 #pragma once
 
 #include <optional>
@@ -69,7 +69,7 @@ class HtmlPage {
   void add(std::string_view opening, std::string_view text, std::string_view closing = "</p>\n");
 
   std::string title_, body_, compared_ = "[]";
-  std::vector<std::string> headings_, plots_, motions_;
+  std::vector<std::string> headings_, motions_;
   PageArrays arrays_;
 };
 

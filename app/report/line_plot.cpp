@@ -16,9 +16,8 @@
 namespace mbsopt::inline app {
 namespace {
 
-constexpr double kPlotWidth = 760, kPlotHeight = 320;               // of the drawing [px]
-constexpr double kLeft = 66, kRight = 22, kTop = 26, kBottom = 44;  // margins
-constexpr double kInnerWidth = kPlotWidth - kLeft - kRight, kInnerHeight = kPlotHeight - kTop - kBottom;
+constexpr double kUnits = 1e6;    // of the frame's width and of its height in paths: what a zoom resolves
+constexpr double kColumns = 672;  // pixels of the widest frame
 constexpr int kColours = 8;
 
 struct AxisRange {
@@ -44,12 +43,14 @@ struct AxisRange {
   }
 };
 
-// Maps data to pixels.
+// Maps positions on the axes to fractions of the frame, from its upper left corner.
 struct PlotFrame {
   AxisRange x, y;
-  double px(double value) const { return kLeft + (value - x.low) / x.span() * kInnerWidth; }
-  double py(double value) const { return kTop + (y.high - value) / y.span() * kInnerHeight; }
+  double right(double value) const { return (value - x.low) / x.span(); }
+  double down(double value) const { return (y.high - value) / y.span(); }
 };
+
+std::string percent(double fraction) { return fmt::format("{:.6g}%", 100 * fraction); }
 
 double x_of(const LinePlot& plot, double value) { return plot.logarithmic_x ? std::log10(value) : value; }
 double y_of(const LinePlot& plot, double value) { return plot.logarithmic_y ? std::log10(value) : value; }
@@ -61,20 +62,19 @@ std::optional<std::pair<double, double>> place_of(const LinePlot& plot, const Pl
 }
 
 struct MarkStyle {
-  const char *name, *style;         // in the page's data; its class
-  const char *key, *drawn;          // paths: in the legend, which ends with `drawn`; at each sample, if it has a symbol
-  double left = 0, up = 0, on = 0;  // of the sample, where the symbol begins; how far on it ends [px]
+  const char *style, *key;  // its class; its path in the legend
+  const char* symbol;       // a path about each sample, for marks that a path through the samples cannot draw
 };
-constexpr MarkStyle kMarks[] = {{"line", "line", "M0 5H30", ""},  // in the order of Mark
-                                {"dashed", "line dashed", "M0 5H30", ""},
-                                {"points", "points", "M5 5h0M15 5h0M25 5", "h0"},
-                                {"rings", "line", "M11 5", "a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", 4},
-                                {"bars", "bars", "M15 0V10", ""},
-                                {"crosses", "cross", "M10 0", "l10 10m-10 0l10 -10", 5, 5, 10}};
+constexpr MarkStyle kMarks[] = {{"line", "M0 5H30", ""},  // in the order of Mark
+                                {"line dashed", "M0 5H30", ""},
+                                {"points", "M5 5h0M15 5h0M25 5h0", ""},
+                                {"line", "M11 5a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", "M-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0"},
+                                {"bars", "M15 0V10", ""},
+                                {"cross", "M10 0l10 10m-10 0l10 -10", "M-5 -5l10 10m-10 0l10 -10"}};
 
 const MarkStyle& mark_of(const PlotSeries& series) { return kMarks[static_cast<int>(series.mark)]; }
 
-bool is_cloud(const PlotSeries& series) { return *mark_of(series).drawn != 0; }
+bool is_cloud(const PlotSeries& series) { return series.mark == Mark::points || *mark_of(series).symbol != 0; }
 
 // The part of the width beside the outermost marks, so that the frame cuts none of them: 4 px of 200.
 constexpr double kAirOfMarks = 0.02;
@@ -99,18 +99,9 @@ PlotFrame frame_of(const LinePlot& plot) {
   }
   const bool has_marks = std::ranges::any_of(
       plot.series, [](const PlotSeries& series) { return is_cloud(series) || series.mark == Mark::bars; });
-  const bool wide = plot.equal_axes || plot.logarithmic_x || !plot.x_names.empty();
+  const bool wide = plot.logarithmic_x || !plot.x_names.empty();
   frame.x.finish(wide ? 0.05 : has_marks ? kAirOfMarks : 0);
   frame.y.finish(0.05);
-  if (plot.equal_axes) {
-    const double scale = std::max(frame.x.span() / kInnerWidth, frame.y.span() / kInnerHeight);
-    const auto widen = [](AxisRange& range, double span) {
-      const double middle = (range.low + range.high) / 2;
-      range.low = middle - span / 2, range.high = middle + span / 2;
-    };
-    widen(frame.x, scale * kInnerWidth);
-    widen(frame.y, scale * kInnerHeight);
-  }
   return frame;
 }
 
@@ -128,7 +119,7 @@ std::vector<std::size_t> random_samples(const std::vector<std::size_t>& all, con
 }
 
 bool is_thinned(const PlotSeries& series) {
-  return !is_cloud(series) && series.x.size() > 2 * static_cast<std::size_t>(kInnerWidth) &&
+  return !is_cloud(series) && series.x.size() > 2 * static_cast<std::size_t>(kColumns) &&
          std::is_sorted(series.x.begin(), series.x.end());
 }
 
@@ -140,7 +131,7 @@ std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries&
   if (!is_thinned(series)) return all;
   std::vector<std::size_t> kept;
   for (std::size_t begin = 0; begin < all.size();) {
-    const auto column_of = [&](std::size_t i) { return std::floor(frame.px(x_of(plot, series.x[i]))); };
+    const auto column_of = [&](std::size_t i) { return std::floor(kColumns * frame.right(x_of(plot, series.x[i]))); };
     const double column = column_of(begin);
     std::size_t end = begin, low = begin, high = begin;
     for (; end < all.size() && column_of(end) == column; ++end) {
@@ -156,66 +147,70 @@ std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries&
   return kept;
 }
 
-// The d of an SVG path. It contains differences in tenths of a px, which are half as long as positions. They lead to
-// rounded positions, so that rounding errors do not add up.
+// The d of an SVG path, in units of the frame. It contains differences, which are half as long as positions. They lead
+// to rounded positions, so that rounding errors do not add up.
 class PathText {
  public:
-  void move(double px, double py) { go('m', px, py); }
-  void line(double px, double py) { go('l', px, py); }
-  // Draws at the position and ends there.
-  void mark(double px, double py, const MarkStyle& mark) {
-    move(px - mark.left, py - mark.up);
-    text_ += mark.drawn, command_ = 0;
-    x_ += std::lround(10 * mark.on);
+  void move(double right, double down) { go('m', right, down); }
+  void line(double right, double down) { go('l', right, down); }
+  void dot() { text_ += "h0", command_ = 0; }
+  void vertical(double down) {
+    const long y = std::lround(kUnits * down);
+    text_ += fmt::format("v{}", y - y_), command_ = 0;
+    y_ = y;
   }
   const std::string& text() const { return text_; }
 
  private:
-  void go(char command, double px, double py) {
-    const long x = std::lround(10 * px), y = std::lround(10 * py);
+  void go(char command, double right, double down) {
+    const long x = std::lround(kUnits * right), y = std::lround(kUnits * down);
     if (command != command_ || command == 'm') text_ += command;  // two places after one m are a line
     command_ = command;
     add(x - x_), add(y - y_);
     x_ = x, y_ = y;
   }
 
-  // Writes 12, -.3, with a space if no sign separates a number from the one before.
-  void add(long tenths) {
-    if (tenths >= 0 && !text_.empty() && std::isdigit(static_cast<unsigned char>(text_.back()))) text_ += ' ';
-    const long size = std::abs(tenths);
-    if (tenths < 0) text_ += '-';
-    if (size >= 10 || size == 0) text_ += std::to_string(size / 10);
-    if (size % 10 != 0) text_ += fmt::format(".{}", size % 10);
+  // Writes a space if no sign separates a number from the one before.
+  void add(long units) {
+    if (units >= 0 && !text_.empty() && std::isdigit(static_cast<unsigned char>(text_.back()))) text_ += ' ';
+    text_ += std::to_string(units);
   }
 
   std::string text_;
   char command_ = 0;
-  long x_ = 0, y_ = 0;  // its end [0.1 px]
+  long x_ = 0, y_ = 0;  // its end
+};
+
+// A drawing in two layers. A zoom shows another part of the curves, which are in units of the frame, and moves the
+// others: names and symbols keep their size, and data-at says which of their coordinates follow the zoom.
+struct Layers {
+  std::string curves, others;
 };
 
 std::size_t colour_of(const PlotSeries& series, std::size_t index) {
   return series.colour.value_or(series.part_of.value_or(index)) % kColours;
 }
 
-void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index, std::string& svg) {
+void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index, Layers& layers) {
   const PlotSeries& series = plot.series[index];
+  const MarkStyle& mark = mark_of(series);
+  const std::string style = fmt::format("class=\"{} c{}\"", mark.style, colour_of(series, index));
   PathText path;
   bool pen_down = false;
   for (const std::size_t i : visible_samples(plot, series, frame)) {
     const auto place = place_of(plot, series, i);
-    const bool connected = std::exchange(pen_down, place.has_value());
+    const bool connected = std::exchange(pen_down, place.has_value() && !is_cloud(series) && series.mark != Mark::bars);
     if (!place) continue;
-    const double px = frame.px(place->first), py = frame.py(place->second);
-    if (is_cloud(series)) {
-      path.mark(px, py, mark_of(series));
-    } else if (series.mark == Mark::bars) {
-      path.move(px, frame.py(0)), path.line(px, py);
-    } else {
-      connected ? path.line(px, py) : path.move(px, py);
-    }
+    const double right = frame.right(place->first), down = frame.down(place->second);
+    connected ? path.line(right, down) : path.move(right, down);
+    if (series.mark == Mark::points) path.dot();
+    if (series.mark == Mark::bars) path.vertical(frame.down(0));
+    if (*mark.symbol)
+      layers.others +=
+          fmt::format("<svg data-series=\"{}\" data-at=\"xy\" {} x=\"{}\" y=\"{}\"><path d=\"{}\"/></svg>\n", index,
+                      style, percent(right), percent(down), mark.symbol);
   }
-  svg += fmt::format("<path data-series=\"{}\" class=\"{} c{}\" d=\"{}\"/>\n", index, mark_of(series).style,
-                     colour_of(series, index), path.text());
+  layers.curves += fmt::format("<path data-series=\"{}\" {} d=\"{}\"/>\n", index, style, path.text());
 }
 
 // The area between a limit and the part of a line beyond it.
@@ -231,41 +226,40 @@ std::string area_beyond(const LinePlot& plot, const PlotFrame& frame, const Plot
     const auto [x, y] = *place;
     const bool beyond = limit.upper ? y > y_limit : y < y_limit;
     any = any || beyond;
-    if (path.text().empty()) path.move(frame.px(x), frame.py(y_limit));
-    path.line(frame.px(x), frame.py(beyond ? y : y_limit));
-    last = frame.px(x);
+    if (path.text().empty()) path.move(frame.right(x), frame.down(y_limit));
+    path.line(frame.right(x), frame.down(beyond ? y : y_limit));
+    last = frame.right(x);
   }
-  path.line(last, frame.py(y_limit));
+  path.line(last, frame.down(y_limit));
   return any ? path.text() + "Z" : std::string();
 }
 
-void draw_limits(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
+void draw_limits(const LinePlot& plot, const PlotFrame& frame, Layers& layers) {
+  constexpr double kUpperEnd = 0.06;  // of the frame: a name there stands below its line
   for (const PlotLimit& limit : plot.limits) {
-    const double y = y_of(plot, limit.value);
+    const double y = y_of(plot, limit.value), down = frame.down(y);
     if (!(y >= frame.y.low && y <= frame.y.high)) continue;
     for (const PlotSeries& series : plot.series) {
       if (series.mark != Mark::line) continue;
       const std::string area = area_beyond(plot, frame, series, limit);
-      if (!area.empty()) svg += fmt::format("<path class=\"beyond\" d=\"{}\"/>\n", area);
+      if (!area.empty()) layers.curves += fmt::format("<path class=\"beyond\" d=\"{}\"/>\n", area);
     }
-    const double py = frame.py(y);
-    svg += fmt::format(
-        "<path class=\"limit\" d=\"M{} {:.1f}h{}\"/><text class=\"limit-name\" x=\"{}\" y=\"{:.1f}\" "
+    layers.curves += fmt::format("<path class=\"limit\" d=\"M0 {:.0f}h{}\"/>\n", kUnits * down, kUnits);
+    layers.others += fmt::format(
+        "<text class=\"limit-name\" data-at=\"y\" x=\"100%\" dx=\"-4\" y=\"{}\" dy=\"{}\" "
         "text-anchor=\"end\">{}</text>\n",
-        kLeft, py, kInnerWidth, kLeft + kInnerWidth - 4, py - kTop < 16 ? py + 14 : py - 4, html_escaped(limit.name));
+        percent(down), down < kUpperEnd ? 14 : -4, html_escaped(limit.name));
   }
 }
 
-void draw_instants(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
+void draw_instants(const LinePlot& plot, const PlotFrame& frame, Layers& layers) {
   for (const PlotInstant& instant : plot.instants) {
     if (!(instant.x >= frame.x.low && instant.x <= frame.x.high)) continue;
-    const double px = frame.px(instant.x);
-    const bool at_left = px < kLeft + kInnerWidth / 2;  // then the name stands to the right of the line
-    svg += fmt::format(
-        "<path class=\"limit dashed\" d=\"M{0:.1f} {1}v{2}\"/><text class=\"limit-name\" x=\"{3:.1f}\" y=\"{4}\" "
-        "text-anchor=\"{5}\">{6}</text>\n",
-        px, kTop, kInnerHeight, px + (at_left ? 4 : -4), kTop + 14, at_left ? "start" : "end",
-        html_escaped(instant.name));
+    const double right = frame.right(instant.x);
+    layers.curves += fmt::format("<path class=\"limit dashed\" d=\"M{:.0f} 0v{}\"/>\n", kUnits * right, kUnits);
+    layers.others += fmt::format(
+        "<text class=\"limit-name\" data-at=\"x\" x=\"{}\" dx=\"{}\" y=\"14\" text-anchor=\"{}\">{}</text>\n",
+        percent(right), right < 0.5 ? 4 : -4, right < 0.5 ? "start" : "end", html_escaped(instant.name));
   }
 }
 
@@ -304,27 +298,20 @@ Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
   return names;
 }
 
-void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
-  const double bottom = kTop + kInnerHeight, right = kLeft + kInnerWidth;
-  std::string grid, x_labels, y_labels;
-  for (const auto& [tick, label] : x_ticks_of(plot, frame)) {
-    const double px = frame.px(tick);
-    grid += fmt::format("M{:.1f} {}V{}", px, kTop, bottom);
-    x_labels += fmt::format("<text x=\"{:.1f}\" y=\"{}\">{}</text>", px, bottom + 16, label);
-  }
-  for (const auto& [tick, label] :
-       ticks_of(frame.y, plot.logarithmic_y, plot.logarithmic_y || !plot.equal_axes ? 6 : 5)) {
-    const double py = frame.py(tick);
-    grid += fmt::format("M{} {:.1f}H{}", kLeft, py, right);
-    y_labels += fmt::format("<text x=\"{}\" y=\"{:.1f}\">{}</text>", kLeft - 6, py + 4, label);
-  }
-  svg += fmt::format(
-      "<g class=\"ticks\"><path class=\"grid\" d=\"{}\"/>\n<g text-anchor=\"middle\">{}</g>\n"
-      "<g text-anchor=\"end\">{}</g></g>\n<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n"
-      "<text class=\"x-label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n"
-      "<text class=\"y-label\" x=\"4\" y=\"16\">{}</text>\n",
-      grid, x_labels, y_labels, kLeft, kTop, kInnerWidth, kInnerHeight, kLeft + kInnerWidth / 2, kPlotHeight - 8,
-      html_escaped(plot.x_label), html_escaped(plot.y_label));
+std::string axes_of(const LinePlot& plot, const PlotFrame& frame) {
+  std::string ticks;
+  for (const auto& [tick, label] : x_ticks_of(plot, frame))
+    ticks += fmt::format("<line x1=\"{0}\" x2=\"{0}\" y2=\"100%\"/><text x=\"{0}\" y=\"100%\" dy=\"16\">{1}</text>\n",
+                         percent(frame.right(tick)), label);
+  for (const auto& [tick, label] : ticks_of(frame.y, plot.logarithmic_y, 6))
+    ticks += fmt::format(
+        "<line y1=\"{0}\" y2=\"{0}\" x2=\"100%\"/><text y=\"{0}\" dx=\"-6\" dy=\"4\" class=\"left\">{1}</text>\n",
+        percent(frame.down(tick)), label);
+  return fmt::format(
+      "<g class=\"ticks\">\n{}</g><rect class=\"frame\" width=\"100%\" height=\"100%\"/>\n"
+      "<text class=\"x-label\" x=\"50%\" y=\"100%\" dy=\"36\">{}</text><text class=\"y-label\" x=\"-62\" "
+      "y=\"-10\">{}</text>\n",
+      ticks, html_escaped(plot.x_label), html_escaped(plot.y_label));
 }
 
 // Says which part of long series the plot draws.
@@ -372,14 +359,14 @@ std::vector<double> logarithmic_ticks(double low, double high, int count) {
 
 std::string to_svg(const LinePlot& plot) {
   const PlotFrame frame = frame_of(plot);
-  std::string svg = fmt::format("<figcaption class=\"title\">{}</figcaption>\n", html_escaped(plot.title));
-  svg += fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", kPlotWidth, kPlotHeight,
-                     html_escaped(plot.title));
-  draw_axes(plot, frame, svg);
-  draw_limits(plot, frame, svg);
-  draw_instants(plot, frame, svg);
-  for (std::size_t i = 0; i < plot.series.size(); ++i) draw_series(plot, frame, i, svg);
-  svg += "</svg>\n";
+  Layers layers;
+  draw_limits(plot, frame, layers);
+  draw_instants(plot, frame, layers);
+  for (std::size_t i = 0; i < plot.series.size(); ++i) draw_series(plot, frame, i, layers);
+  std::string svg = fmt::format(
+      "<figcaption class=\"title\">{0}</figcaption>\n<svg role=\"img\" aria-label=\"{0}\">\n{1}<svg class=\"curves\" "
+      "viewBox=\"0 0 {2} {2}\" preserveAspectRatio=\"none\">\n{3}</svg>\n{4}</svg>\n",
+      html_escaped(plot.title), axes_of(plot, frame), kUnits, layers.curves, layers.others);
   if (plot.series.size() > 1) {
     svg += "<div class=\"legend\">";
     for (std::size_t i = 0; i < plot.series.size(); ++i) {
@@ -388,36 +375,23 @@ std::string to_svg(const LinePlot& plot) {
       if (series.part_of) continue;
       svg += fmt::format(
           "<span data-series=\"{}\"><svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" "
-          "d=\"{}{}\"/></svg>{}</span>",
-          i, mark.style, colour_of(series, i), mark.key, mark.drawn, html_escaped(series.name));
+          "d=\"{}\"/></svg>{}</span>",
+          i, mark.style, colour_of(series, i), mark.key, html_escaped(series.name));
     }
     svg += "</div>\n";
   }
   return svg + thinning_note(plot);
 }
 
-std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
-  constexpr int kTimeDigits = 9;  // of x: 1000.001 s and 1000.002 s are two instants
+std::string plot_data(const LinePlot& plot) {
   const PlotFrame frame = frame_of(plot);
-  const auto series_json = [&](const PlotSeries& s) {
-    std::vector<double> x, y;
-    for (const std::size_t i : visible_samples(plot, s, frame)) x.push_back(s.x[i]), y.push_back(s.y[i]);
-    return fmt::format(R"({{"name":{},"mark":"{}","part":{},"x":{},"y":{}}})", json_quoted(s.name), mark_of(s).name,
-                       s.part_of ? static_cast<long>(*s.part_of) : -1,
-                       arrays.add(x, std::max(kTimeDigits, frame.x.digits())), arrays.add(y, frame.y.digits()));
+  const auto series_json = [](const PlotSeries& s) {
+    return fmt::format(R"({{"name":{},"part":{}}})", json_quoted(s.name),
+                       s.part_of ? static_cast<long>(*s.part_of) : -1);
   };
-  const auto limit_json = [](const PlotLimit& limit) {
-    return fmt::format(R"({{"name":{},"value":{:.9g},"upper":{}}})", json_quoted(limit.name), limit.value, limit.upper);
-  };
-  const auto instant_json = [](const PlotInstant& instant) {
-    return fmt::format(R"({{"name":{},"x":{:.9g}}})", json_quoted(instant.name), instant.x);
-  };
-  return fmt::format(R"({{"x":[{},{}],"y":[{},{}],"logx":{},"logy":{},"whole":{},"equal":{},"xlabel":{},"ylabel":{},)"
-                     R"("series":{},"limits":{},"instants":{},"names":{}}})",
-                     frame.x.low, frame.x.high, frame.y.low, frame.y.high, plot.logarithmic_x, plot.logarithmic_y,
-                     plot.whole_x, plot.equal_axes, json_quoted(plot.x_label), json_quoted(plot.y_label),
-                     json_list(plot.series, series_json), json_list(plot.limits, limit_json),
-                     json_list(plot.instants, instant_json), json_list(plot.x_names, json_quoted));
+  return fmt::format(R"({{"x":[{},{}],"y":[{},{}],"log":{{"x":{},"y":{}}},"whole":{},"names":{},"series":{}}})",
+                     frame.x.low, frame.x.high, frame.y.high, frame.y.low, plot.logarithmic_x, plot.logarithmic_y,
+                     plot.whole_x, json_list(plot.x_names, json_quoted), json_list(plot.series, series_json));
 }
 
 }  // namespace mbsopt::inline app

@@ -1,5 +1,6 @@
 // A line plot as HTML text with an SVG in it: a title, axes with round numbers and units in the labels, a legend.
-// Colours come from the page's style. The page's script fits the drawing to the width of the window.
+// Colours and margins come from the page's style. Places are fractions of the frame, so that the drawing fits each
+// width and the page's script can zoom into it and read its values.
 //
 // A line of many samples keeps the first, lowest, highest and last of every pixel column, which draws the same. Points
 // are a cloud, and such a choice would change its density. Beyond kMostPoints the plot draws a random part of them
@@ -47,7 +48,6 @@ struct LinePlot {
   bool logarithmic_y = false;  // values <= 0 are left out
   bool logarithmic_x = false;  // likewise
   bool whole_x = false;        // x counts: ticks at whole numbers only
-  bool equal_axes = false;     // one metre is as long in x as in y: for paths
   std::vector<PlotLimit> limits = {};
   std::vector<PlotInstant> instants = {};
   std::vector<std::string> x_names = {};  // instead of numbers at x = 0, 1, 2, ...
@@ -57,9 +57,8 @@ inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of
 
 std::string to_svg(const LinePlot& plot);
 
-class PageArrays;
-// The data of the plot as JSON, for the page's script: the samples in to_svg, with six digits of the range.
-std::string plot_data(const LinePlot& plot, PageArrays& arrays);
+// What the drawing alone does not tell the page's script: ranges of the axes, names of the series; as JSON.
+std::string plot_data(const LinePlot& plot);
 
 // About `count` round numbers (1, 2 or 5 times a power of ten) that cover [low, high].
 std::vector<double> round_ticks(double low, double high, int count);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "app/report/html_text.hpp"
 #include "app/report/line_plot.hpp"
@@ -11,85 +12,63 @@
 namespace mbsopt::inline app {
 namespace {
 
-// Positions in the drawing [px]. On a narrow page names and numbers share a line above their bar.
-struct RowLayout {
-  const char* name;                      // class of the drawing
-  double width, names, words, row, bar;  // words: width right of the bars; bar: its place in the row
-  bool stacked;
-  int ticks;
-};
-constexpr RowLayout kLayouts[] = {{"wide", 760, 150, 190, 26, 13, false, 5}, {"narrow", 380, 8, 8, 44, 30, true, 5}};
-constexpr double kRowsTop = 8, kRowsBottom = 44;  // margins [px]
-
-std::pair<double, double> row_range_of(const RowPlot& plot) {
-  if (plot.range) return *plot.range;
+// The numbers at the left and right end, and fractions of the width between them.
+struct RowAxis {
   double low = 0, high = 0;  // zero is always in sight: bars are compared with it
-  for (const PlotRow& row : plot.rows) {
-    for (const double x : {row.low, row.high, row.ring.value_or(0), row.dot.value_or(0)})
-      if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
+
+  explicit RowAxis(const RowPlot& plot) {
+    if (plot.range) {
+      std::tie(low, high) = *plot.range;
+      return;
+    }
+    for (const PlotRow& row : plot.rows) {
+      for (const double x : {row.low, row.high, row.ring.value_or(0), row.dot.value_or(0)})
+        if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
+    }
+    const double air = high > low ? 0.05 * (high - low) : 1;
+    low -= air, high += air;
   }
-  const double air = high > low ? 0.05 * (high - low) : 1;
-  return {low - air, high + air};
-}
+  std::string percent(double x) const {
+    return fmt::format("{:.5g}%", 100 * (std::clamp(std::isnan(x) ? low : x, low, high) - low) / (high - low));
+  }
+};
 
-std::string shortened(const std::string& name, std::size_t most) {
-  return name.size() <= most ? name : name.substr(0, most - 1) + "\u2026";
-}
-
-std::string drawing_of(const RowPlot& plot, const RowLayout& at) {
-  constexpr std::size_t kBesideBars = 20, kAboveBars = 24;  // characters of a name
-  constexpr std::size_t kMostWords = 27;                    // characters at their full width
-  const auto [low, high] = row_range_of(plot);
-  const double inner = at.width - at.names - at.words,
-               bottom = kRowsTop + at.row * static_cast<double>(plot.rows.size());
-  const auto px = [&, first = low, last = high](double x) {
-    return at.names + (std::clamp(std::isfinite(x) ? x : first, first, last) - first) / (last - first) * inner;
+// The bars of a row have the height of report.css [px]: their middle is at 13, thin lines lie above it.
+std::string bars_of(const RowPlot& plot, const PlotRow& row, const RowAxis& axis) {
+  const auto bar = [&](const char* style, double from, double to, int top, int bottom) {
+    return fmt::format("<line class=\"{}\" x1=\"{}\" x2=\"{}\" y1=\"{}\" y2=\"{}\"/>", style, axis.percent(from),
+                       axis.percent(to), top, bottom);
   };
-  std::string svg = fmt::format("<svg class=\"{}\" viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\">\n",
-                                at.name, at.width, bottom + kRowsBottom, html_escaped(plot.title));
-  for (const double tick : round_ticks(low, high, at.ticks))
-    svg += fmt::format(
-        "<path class=\"grid\" d=\"M{0:.1f} {1}V{2:.1f}\"/><text x=\"{0:.1f}\" y=\"{3:.1f}\" "
-        "text-anchor=\"middle\">{4:.6g}</text>\n",
-        px(tick), kRowsTop, bottom, bottom + 16, tick);
-  for (std::size_t k = 0; k < plot.rows.size(); ++k) {
-    const PlotRow& row = plot.rows[k];
-    const double top = kRowsTop + at.row * static_cast<double>(k), y = top + at.bar,
-                 text = at.stacked ? top + 16 : y + 4;
-    svg += fmt::format("<g><title>{}: {}</title><text x=\"{}\" y=\"{:.1f}\">{}</text>", html_escaped(row.name),
-                       html_escaped(row.words), at.stacked ? at.names + 4 : 0, text,
-                       html_escaped(shortened(row.name, at.stacked ? kAboveBars : kBesideBars)));
-    const std::string squeezed =
-        row.words.size() > kMostWords ? " textLength=\"176\" lengthAdjust=\"spacingAndGlyphs\"" : std::string();
-    if (plot.track) svg += fmt::format("<path class=\"track\" d=\"M{} {:.1f}h{}\"/>", at.names, y, inner);
-    svg += fmt::format("<path class=\"thick c{}\" d=\"M{:.1f} {:.1f}H{:.1f}\"/>", row.high < row.low ? 1 : 0,
-                       px(row.low), y, px(row.high));
-    if (row.prior)
-      svg += fmt::format("<path class=\"line c1\" d=\"M{:.1f} {:.1f}H{:.1f}\"/>", px(row.prior->first), y - 8,
-                         px(row.prior->second));
-    for (const double bound : row.bounds)
-      if (bound >= low && bound <= high)
-        svg += fmt::format("<path class=\"limit\" d=\"M{:.1f} {:.1f}v16\"/>", px(bound), y - 8);
-    if (row.ring) svg += fmt::format("<circle class=\"joint\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/>", px(*row.ring), y);
-    if (row.dot) svg += fmt::format("<circle class=\"f7\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/>", px(*row.dot), y);
-    svg += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text></g>\n",
-                       at.stacked ? at.width - at.words - 4 : at.width - at.words + 10, text,
-                       at.stacked ? "end" : "start", squeezed, html_escaped(row.words));
-  }
-  return svg + fmt::format(
-                   "<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\"/>\n"
-                   "<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n</svg>\n",
-                   at.names, kRowsTop, inner, bottom - kRowsTop, at.names + inner / 2, bottom + 36,
-                   html_escaped(plot.x_label));
+  std::string svg;
+  if (plot.track) svg += bar("track", -INFINITY, INFINITY, 13, 13);
+  svg += bar(row.high < row.low ? "thick c1" : "thick c0", row.low, row.high, 13, 13);
+  if (row.prior) svg += bar("line c1", row.prior->first, row.prior->second, 5, 5);
+  for (const double bound : row.bounds)
+    if (bound >= axis.low && bound <= axis.high) svg += bar("limit", bound, bound, 5, 21);
+  for (const auto& [style, at] : {std::pair("joint", row.ring), std::pair("f7", row.dot)})
+    if (at) svg += fmt::format("<circle class=\"{}\" cx=\"{}\" cy=\"13\" r=\"5\"/>", style, axis.percent(*at));
+  return svg;
 }
 
 }  // namespace
 
 std::string to_svg(const RowPlot& plot) {
   if (plot.rows.empty()) return {};
-  std::string figure = fmt::format("<figure><figcaption class=\"title\">{}</figcaption>\n", html_escaped(plot.title));
-  for (const RowLayout& layout : kLayouts) figure += drawing_of(plot, layout);
-  return figure + "</figure>\n";
+  const RowAxis axis(plot);
+  std::string grid, labels;
+  for (const double tick : round_ticks(axis.low, axis.high, 5)) {
+    grid += fmt::format("<line class=\"grid\" x1=\"{0}\" x2=\"{0}\" y2=\"100%\"/>", axis.percent(tick));
+    labels += fmt::format("<text x=\"{}\" y=\"16\">{:.6g}</text>", axis.percent(tick), tick);
+  }
+  std::string figure =
+      fmt::format("<figure class=\"rows\"><figcaption class=\"title\">{}</figcaption>\n", html_escaped(plot.title));
+  for (const PlotRow& row : plot.rows) {
+    const std::string name = html_escaped(row.name), words = html_escaped(row.words);
+    figure += fmt::format("<div title=\"{0}: {1}\"><span>{0}</span><svg>{2}{3}</svg><span>{1}</span></div>\n", name,
+                          words, grid, bars_of(plot, row, axis));
+  }
+  return figure + fmt::format("<div><svg>{}<text x=\"50%\" y=\"34\">{}</text></svg></div></figure>\n", labels,
+                              html_escaped(plot.x_label));
 }
 
 }  // namespace mbsopt::inline app

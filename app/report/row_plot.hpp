@@ -1,5 +1,5 @@
 // Rows of bars along one axis, as an HTML figure: intervals of estimates, variables between their bounds, sizes of
-// effects. It holds a wide and a narrow drawing; the page's style shows one of them.
+// effects. The page's style puts the name and the words of a row beside its bars, or above them on a narrow page.
 //
 //   RowPlot plot{.title = "Effect of 1 %", .x_label = "p dpsi/dp / psi [-]"};
 //   plot.rows.push_back({.name = "k", .low = 0, .high = 0.3, .words = "0.3"});

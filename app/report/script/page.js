@@ -7,10 +7,11 @@ document.documentElement.classList.add("scripted");
 // An element with attributes and children. Within a plot, the namespace is that of its drawing.
 function element(tag, attributes = {}, children = [], namespace = null) {
   const e = namespace ? document.createElementNS(namespace, tag) : document.createElement(tag);
-  for (const [key, value] of Object.entries(attributes)) e.setAttribute(key, value);
+  set(e, attributes);
   e.append(...children);
   return e;
 }
+function set(e, attributes) { for (const [key, value] of Object.entries(attributes)) e.setAttribute(key, value); }
 function shown(value, digits = 6) {
   return value === null || value === undefined ? "-" : String(Number(value.toPrecision(digits)));
 }

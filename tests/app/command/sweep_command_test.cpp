@@ -117,12 +117,12 @@ TEST_CASE("the report of a sweep names the extremes, plots each objective and li
   std::vector<std::string> expected;
   for (std::size_t i = 0; i < 20; ++i) expected.push_back(std::to_string(order[i] + 1));
   CHECK(rows == expected);
-  CHECK_THAT(line, Contains("\"mark\":\"line\"") && Contains("of 30 with values"));
+  CHECK_THAT(line, Contains("class=\"line c0\"") && Contains("of 30 with values"));
 
   swept(folder, {"--vary", "k=5:20:3", "--vary", "free=0.4:0.6:2"}, "grid");
   const std::string grid = content_of(folder.path / "grid/report.html");
-  CHECK_THAT(grid, Contains("track over k") && Contains("track over free") && Contains("\"mark\":\"points\""));
-  CHECK_THAT(grid, !Contains("\"mark\":\"line\"") && !Contains("limits of the design"));
+  CHECK_THAT(grid, Contains("track over k") && Contains("track over free") && Contains("class=\"points c0\""));
+  CHECK_THAT(grid, !Contains("class=\"line c0\"") && !Contains("limits of the design"));
 }
 
 TEST_CASE("a sweep says where true extremes are least and largest, the same everywhere", "[command][sweep][report]") {

@@ -9,8 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "app/report/html_text.hpp"
-
 using namespace mbsopt;
 
 namespace {
@@ -20,13 +18,15 @@ struct DrawnPoint {
   bool begins;  // a move leads there, not a line
 };
 
-// Where the path of a class goes: absolute and relative moves, lines and the zero strokes of points.
+constexpr double kUnit = 1e-6;  // of the frame's width and height
+
+// Where the path of a class goes, in fractions of the frame: relative moves, lines and the zero strokes of points.
 std::vector<DrawnPoint> drawn_points(const std::string& svg, const std::string& style) {
   const std::string before = "class=\"" + style + "\" d=\"";
   const std::size_t at = svg.find(before), begin = at + before.size();
   REQUIRE(at != std::string::npos);
   const std::string path = svg.substr(begin, svg.find('"', begin) - begin);
-  const std::regex token("[A-Za-z]|-?(?:[0-9]+(?:\\.[0-9]+)?|\\.[0-9]+)");
+  const std::regex token("[A-Za-z]|-?[0-9]+");
   std::vector<std::string> tokens;
   for (std::sregex_iterator it(path.begin(), path.end(), token), end; it != end; ++it) tokens.push_back(it->str());
   std::vector<DrawnPoint> points;
@@ -39,7 +39,7 @@ std::vector<DrawnPoint> drawn_points(const std::string& svg, const std::string& 
       continue;
     }
     REQUIRE((command == 'm' || command == 'l'));
-    x += std::stod(tokens.at(i)), y += std::stod(tokens.at(i + 1)), i += 2;
+    x += kUnit * std::stod(tokens.at(i)), y += kUnit * std::stod(tokens.at(i + 1)), i += 2;
     points.push_back({x, y, command == 'm'});
   }
   return points;
@@ -89,6 +89,7 @@ TEST_CASE("a legend shows lines as they are drawn", "[report]") {
   const std::string svg = to_svg(plot);
   const std::string legend = svg.substr(svg.find("legend"));
   const auto rings = [](const std::string& text) { return text.find("a4 4 0 1 0 8 0"); };
+  CHECK(svg.find("data-at=\"xy\" class=\"line c2\" x=\"50%\" y=\"50%\"") != std::string::npos);
   CHECK(rings(svg) < svg.find("legend"));
   CHECK(rings(legend) < legend.find("best"));
   CHECK(legend.find("class=\"line dashed c0\"") < legend.find("before"));
@@ -126,8 +127,8 @@ TEST_CASE("thinning a long record keeps its highest and lowest value", "[report]
   plot.series.push_back(series);
   const std::string svg = to_svg(plot);
   CHECK(svg.size() < 100'000);
-  // The range is [-1, 10] with 5 % of air: the spike is drawn at 26 + 0.55/12.1 * 250 px.
-  CHECK(std::ranges::min(drawn_points(svg, "line c0"), {}, &DrawnPoint::y).y == Approx(37.4));
+  // The range is [-1, 10] with 5 % of air: the spike is drawn at 0.55/12.1 of the height.
+  CHECK(std::ranges::min(drawn_points(svg, "line c0"), {}, &DrawnPoint::y).y == Approx(0.55 / 12.1).margin(1e-6));
 }
 
 TEST_CASE("a line of many samples is drawn where they are", "[report]") {
@@ -139,20 +140,20 @@ TEST_CASE("a line of many samples is drawn where they are", "[report]") {
   REQUIRE(points.size() == 1001);
   double largest = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const double x = 66 + 672 * series.x[i] / 1000;         // the frame: 672 by 250 px from (66, 26)
-    const double y = 26 + 250 * (1.1 - series.y[i]) / 2.2;  // 5 % of air
+    const double x = series.x[i] / 1000, y = (1.1 - series.y[i]) / 2.2;  // 5 % of air
     largest = std::max({largest, std::abs(points[i].x - x), std::abs(points[i].y - y)});
   }
-  CHECK(largest < 0.06);  // rounded to tenths of a px
+  CHECK(largest < 2e-5);  // the lowest sample lies 3e-5 above -1
 }
 
-TEST_CASE("values that differ little beside their size stay apart in the page's data and on the axis", "[report]") {
+TEST_CASE("values that differ little beside their size stay apart in the drawing and on the axis", "[report]") {
   LinePlot plot{.title = "", .x_label = "", .y_label = ""};
   plot.series.push_back({"far", {0, 1, 2}, {5000.0001, 5000.0002, 5000.0003}, Mark::line});
-  PageArrays arrays;
-  plot_data(plot, arrays);
-  CHECK(arrays.text().find("[5000.0001,5000.0002,5000.0003]") != std::string::npos);
   const std::string svg = to_svg(plot);
+  const std::vector<DrawnPoint> points = drawn_points(svg, "line c0");
+  REQUIRE(points.size() == 3);
+  CHECK(points[0].y - points[1].y == Approx(points[1].y - points[2].y).epsilon(1e-4));
+  CHECK(plot_data(plot).find("5000.0001") == std::string::npos);  // the ends of the axis have some air
   CHECK(svg.find(">5000.0001<") != std::string::npos);
   CHECK(svg.find(">5000.0002<") != std::string::npos);
 }
@@ -163,8 +164,8 @@ TEST_CASE("the frame cuts no point", "[report]") {
   const std::string svg = to_svg(plot);
   const std::vector<DrawnPoint> points = drawn_points(svg, "points c0");
   REQUIRE(points.size() == 2);
-  CHECK(points[0].x > 66 + 4);        // the frame begins at 66 px, a point has a radius of 1.5 px
-  CHECK(points[1].x < 760 - 22 - 4);  // and ends there
+  CHECK(points[0].x > 4.0 / 332);  // a point has a radius of 1.5 px, the frame on a narrow page 332 px
+  CHECK(points[1].x < 1 - 4.0 / 332);
 }
 
 TEST_CASE("a constant, an empty and a logarithmic series are drawn", "[report]") {
