@@ -18,8 +18,9 @@ PICTURES = ROOT / "docs/gallery"
 # The colours of report.css on white.
 STYLE = """<style>text{fill:#5d6670;font:12px sans-serif} .title{fill:#1b1f24;font-weight:600}
 .grid{stroke:#dfe3e8} .frame{fill:none;stroke:#5d6670} .body{fill-opacity:.12;stroke-width:2.4} .earlier{opacity:.55}
-.earlier .body{stroke-dasharray:6 4;fill-opacity:.05} .spring{fill:none;stroke:#5d6670} .ground{fill:#5d6670}
-.joint{fill:#fff;stroke:#1b1f24} COLOURS</style><rect width="100%" height="100%" fill="#fff"/>"""
+.earlier .body{stroke-dasharray:6 4;fill-opacity:.05} .solid{fill-opacity:.3;stroke-width:1.6}
+.mark{vector-effect:non-scaling-stroke} .spring,.ground{fill:none;stroke:#5d6670}
+.joint{fill:#fff;stroke:#1b1f24} .joint.fixed{fill:#1b1f24} COLOURS</style><rect width="100%" height="100%" fill="#fff"/>"""
 COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7a5195", "#444444"]
 
 

@@ -97,30 +97,10 @@ void add_outcome(HtmlPage& page, const Json& result) {
   page.table(header, rows);
   if (!result.contains("conflicts")) return;
   page.paragraph("These limits and bounds are in conflict:");
-  std::vector<std::vector<std::string>> conflicts;
+  std::vector<TableRow> conflicts;
   for (const Json& c : result["conflicts"])
     conflicts.push_back({cell(c.at("limit")), cell(c.at("missed")), cell(c.at("price"))});
   page.table({"limit", "missed by", "price"}, conflicts);
-}
-
-void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho, const DesignMotion& earlier,
-                  const DesignMotion& later, const std::vector<PointTarget>& targets) {
-  const Trajectory &before = earlier.trajectory, &after = later.trajectory;
-  if (before.rows.empty()) return;
-  const std::array<int, 2> plane = plane_of_motion(scene, before);
-  if (after.rows.empty()) {
-    add_motion(page, plane, {{"before", scene, before, false, targets, earlier.forces}},
-               mechanism_drawing("Before, at start and end", plane,
-                                 {{"start", scene, before.rows.front()}, {"end", scene, before.rows.back()}}));
-    return;
-  }
-  const Scene designed = with_values(scene, rho);
-  const auto still = [&](const char* title, const std::vector<double>& first, const std::vector<double>& second) {
-    return mechanism_drawing(title, plane, {{"before", scene, first}, {"after", designed, second}});
-  };
-  add_motion(page, plane, {{"before", scene, before, true}, {"after", designed, after, false, targets, later.forces}},
-             still("At the start", before.rows.front(), after.rows.front()) +
-                 still("At the end", before.rows.back(), after.rows.back()));
 }
 
 void add_running_terms(HtmlPage& page, const DesignMotion& before, const DesignMotion& after,
@@ -159,7 +139,12 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
                   objectives.empty() ? kUnknownUnit : unit_of(*objectives.begin()));
   add_multistart(page, scene, result);
   page.heading("Motion before and after");
-  add_drawings(page, scene, rho, before, after, targets);
+  const Scene designed = with_values(scene, rho);
+  if (!after.trajectory.rows.empty())
+    add_motion(page, {{"before", scene, before.trajectory, true},
+                      {"after", designed, after.trajectory, false, targets, after.forces}});
+  else
+    add_motion(page, {{"before", scene, before.trajectory, false, targets, before.forces}});
   for (const LinePlot& plot : motion_plots(scene, before.trajectory, after.trajectory, limits)) page.plot(plot);
   add_running_terms(page, before, after, terms);
   return finished(page, result);

@@ -1,7 +1,6 @@
 #include "app/report/html_page.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +20,7 @@ constexpr std::size_t kUpright = 2;  // letters of a name that stands upright ab
 constexpr std::size_t kFewColumns = 8;  // they fit a printed page of 18 cm without breaks within words
 
 // Writes words as the value of an attribute.
-std::string list_of(const std::vector<std::string>& words) { return html_escaped(json_list(words, json_quoted)); }
+std::string list_of(const std::vector<std::string>& words) { return html_escaped(json_text(Json(words))); }
 
 // breaks allows several lines of text.
 std::string cell_of(const TableCell& cell, bool words, bool breaks) {
@@ -91,32 +90,33 @@ void HtmlPage::begin_choice(const std::vector<std::string>& keys, std::string_vi
   body_ += fmt::format("<div data-keys=\"{}\"{}>\n", list_of(keys), id.empty() ? "" : fmt::format(" id=\"{}\"", id));
 }
 
-void HtmlPage::motion(std::string_view json, std::string_view stills) {
-  body_ += fmt::format("<div class=\"viewer\" data-motion=\"{}\"></div><div class=\"still\">{}</div>\n",
-                       motions_.size(), stills);
-  motions_.emplace_back(json);
+void HtmlPage::motion(Json scene, std::string_view stills) {
+  Json& motions = data_["motions"];
+  body_ += fmt::format("<div class=\"viewer\" data-motion=\"{}\"></div><div class=\"still\">{}</div>\n", motions.size(),
+                       stills);
+  motions.push_back(std::move(scene));
 }
 
-void HtmlPage::comparison(std::string_view runs) {
+void HtmlPage::comparison(Json runs) {
   heading("Two runs compared");
   body_ += "<div data-comparison></div><noscript><p>A browser with scripts compares them here.</p></noscript>\n";
-  compared_ = without_tags(std::string(runs));
+  data_["runs"] = std::move(runs);
 }
 
 std::string HtmlPage::text() const {
   std::string contents;
   for (std::size_t k = 0; k < headings_.size(); ++k)
     contents += fmt::format("<a href=\"#part{}\">{}</a>", k + 1, html_escaped(headings_[k]));
+  std::string data = json_text(data_);  // "<" stands in texts only, where "</script" would end the script
+  for (std::size_t at = 0; (at = data.find('<', at)) != std::string::npos;) data.replace(at, 1, "\\u003c");
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<meta name=\"color-scheme\" "
       "content=\"light dark\">\n<title>{0}</title><style>{1}</style></head>\n<body>\n"
       "<nav aria-label=\"Contents\">{2}</nav>\n<main>\n<h1>{0}</h1>\n{3}</main>\n"
       "<script type=\"application/json\" "
-      "id=\"data\">{{\"arrays\":{4},\n\"motions\":[{5}],\n\"runs\":{7}}}</script>\n"
-      "<script>{6}</script>\n</body></html>\n",
-      html_escaped(title_), kReportStyle, contents, body_, arrays_.text(), fmt::join(motions_, ",\n"), kReportScript,
-      compared_);
+      "id=\"data\">{4}</script>\n<script>{5}</script>\n</body></html>\n",
+      html_escaped(title_), kReportStyle, contents, body_, data, kReportScript);
 }
 
 }  // namespace mbsopt::inline app

@@ -3,7 +3,7 @@
 //
 // The page shows everything without scripts. Its script (script/*.js) adds functions. Plots get the values under the
 // pointer, zoom and legends that hide. A mechanism gets its motion, and tables a copy as CSV. The script reads the
-// values of a plot from its drawing, and motions from one block of JSON, which holds equal arrays once.
+// values of a plot from its drawing, and motions from one block of JSON.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/report/html_text.hpp"
+#include "app/files/json_text.hpp"
 
 namespace mbsopt::inline app {
 
@@ -43,12 +43,6 @@ class HtmlPage {
   void code(std::string_view text) { add("<code>", text, "</code>\n"); }
   // The first column holds names; the others are numbers or short words. A dense table has narrow columns, for colours.
   void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense = false);
-  template <class Text>
-  void table(const std::vector<std::string>& header, const std::vector<std::vector<Text>>& rows) {
-    std::vector<TableRow> cells;
-    for (const auto& row : rows) cells.emplace_back(row.begin(), row.end());
-    table(header, cells);
-  }
   void plot(const LinePlot& plot);
   // Parts of which the script shows one at a time. `names` are those of the selectors. `keys` give the choice of each,
   // and id serves links to it.
@@ -59,18 +53,17 @@ class HtmlPage {
   void end_choices() { body_ += "</div>\n"; }
   void drawing(std::string_view svg) { body_ += svg; }
   // A moving mechanism, as JSON for script/viewer.js, above the drawings that replace it without a script.
-  void motion(std::string_view json, std::string_view stills);
+  void motion(Json scene, std::string_view stills);
   // Compares two of several runs; runs is [{"name": "a", "numbers": {"objective path": 1.2}}, ...]
-  void comparison(std::string_view runs);
-  PageArrays& arrays() { return arrays_; }
+  void comparison(Json runs);
   std::string text() const;
 
  private:
   void add(std::string_view opening, std::string_view text, std::string_view closing = "</p>\n");
 
-  std::string title_, body_, compared_ = "[]";
-  std::vector<std::string> headings_, motions_;
-  PageArrays arrays_;
+  std::string title_, body_;
+  std::vector<std::string> headings_;
+  Json data_ = {{"motions", Json::array()}, {"runs", Json::array()}};  // for the script
 };
 
 }  // namespace mbsopt::inline app

@@ -1,14 +1,8 @@
 #include "app/report/html_text.hpp"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cmath>
-
-#include "app/files/json_text.hpp"
 
 namespace mbsopt::inline app {
 
@@ -37,23 +31,5 @@ std::string html_words(std::string_view text) {
   }
   return words;
 }
-
-std::string json_quoted(std::string_view text) { return without_tags(json_text(text)); }
-
-std::string without_tags(std::string json) {
-  for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) json.replace(at, 1, "\\u003c");
-  return json;
-}
-
-std::size_t PageArrays::add(const std::vector<double>& values, int digits) {
-  const std::string text = json_list(values, [&](double value) {
-    return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : std::string("null");
-  });
-  const auto [at, is_new] = numbers_.emplace(text, texts_.size());
-  if (is_new) texts_.push_back(at->first);
-  return at->second;
-}
-
-std::string PageArrays::text() const { return fmt::format("[{}]", fmt::join(texts_, ",\n")); }
 
 }  // namespace mbsopt::inline app

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "app/report/line_plot.hpp"
-#include "app/report/mechanism_drawing.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/row_plot.hpp"
 #include "app/report/run_report.hpp"
@@ -157,7 +156,7 @@ void add_correlation(HtmlPage& page, const Json& result) {
 
 void add_experiments(HtmlPage& page, const Json& result) {
   if (!result.contains("experiments")) return;
-  std::vector<std::vector<std::string>> rows, tests;
+  std::vector<TableRow> rows, tests;
   for (const auto& [name, experiment] : result.at("experiments").items()) {
     for (const auto& [channel, fit] : experiment.at("channels").items()) {
       rows.push_back({name, channel, cell(experiment.at("role")), cell(fit.at("samples")), cell(fit.at("rms"), 4),
@@ -191,7 +190,7 @@ void add_profiles(HtmlPage& page, const Json& result) {
   page.heading("Profile likelihood");
   page.paragraph(
       "The parameter is held, all others are fitted again. Where the model is linear in it, tau is a straight line.");
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
   for (const auto& [name, profile] : result.at("profiles").items())
     rows.push_back({name, "[" + cell(profile.at("ci95")) + "]", cell(profile.value("no_lower_end", Json())),
                     cell(profile.value("no_upper_end", Json()))});
@@ -337,11 +336,7 @@ std::string identification_report(const Scene& scene, const Json& result, const 
   add_profiles(page, result);
   if (!motion.empty()) {
     page.heading("Motion of the first experiment");
-    const MovingState& last = motion.back();
-    const std::array<int, 2> plane = plane_of_motion(last.scene, last.trajectory);
-    std::vector<DrawnState> states;
-    for (const MovingState& state : motion) states.push_back({state.name, state.scene, state.trajectory.rows.front()});
-    add_motion(page, plane, motion, mechanism_drawing("The mechanism at the start", plane, states));
+    add_motion(page, motion);
   }
   page.heading("Measured and model");
   add_experiments(page, result);

@@ -11,6 +11,7 @@
 #include <random>
 #include <utility>
 
+#include "app/files/json_text.hpp"
 #include "app/report/html_text.hpp"
 
 namespace mbsopt::inline app {
@@ -385,13 +386,15 @@ std::string to_svg(const LinePlot& plot) {
 
 std::string plot_data(const LinePlot& plot) {
   const PlotFrame frame = frame_of(plot);
-  const auto series_json = [](const PlotSeries& s) {
-    return fmt::format(R"({{"name":{},"part":{}}})", json_quoted(s.name),
-                       s.part_of ? static_cast<long>(*s.part_of) : -1);
-  };
-  return fmt::format(R"({{"x":[{},{}],"y":[{},{}],"log":{{"x":{},"y":{}}},"whole":{},"names":{},"series":{}}})",
-                     frame.x.low, frame.x.high, frame.y.high, frame.y.low, plot.logarithmic_x, plot.logarithmic_y,
-                     plot.whole_x, json_list(plot.x_names, json_quoted), json_list(plot.series, series_json));
+  Json series = Json::array();
+  for (const PlotSeries& s : plot.series)
+    series.push_back({{"name", s.name}, {"part", s.part_of ? static_cast<long>(*s.part_of) : -1}});
+  return json_text({{"x", {frame.x.low, frame.x.high}},
+                    {"y", {frame.y.high, frame.y.low}},
+                    {"log", {{"x", plot.logarithmic_x}, {"y", plot.logarithmic_y}}},
+                    {"whole", plot.whole_x},
+                    {"names", plot.x_names},
+                    {"series", series}});
 }
 
 }  // namespace mbsopt::inline app

@@ -103,7 +103,7 @@ std::string linearisation_report(const Scene& scene, const Json& result, const L
   page.table({"mode", "moves most", "frequency [Hz]", "damping ratio", "Re lambda [1/s]", "Im lambda [1/s]"}, rows);
   for (std::size_t k = 0; k < std::min(shapes.size(), kDrawn); ++k) {
     const std::string title = fmt::format("Mode {}, {} Hz", k + 1, cell(modes[k].at("frequency"), 4));
-    const std::array<int, 2> plane = plane_of_motion(scene, {trajectory_columns(scene), {state, shapes[k]}});
+    const std::array<int, 2> plane = plane_of_motion(scene, {trajectory_columns(scene), {state, shapes[k]}}).axes;
     page.drawing(mechanism_drawing(title, plane, {{"state", scene, state}, {"displaced", scene, shapes[k]}}));
   }
   if (shapes.size() > kDrawn) page.paragraph(fmt::format("The first {} of {} modes are drawn.", kDrawn, shapes.size()));

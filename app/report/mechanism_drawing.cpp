@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "app/report/html_text.hpp"
@@ -69,16 +68,16 @@ struct View {
   }
 };
 
-// The drawing shows a joint at its point on the ground, or else on its second body.
-const SketchPoint& drawn_point(const SketchedJoint& joint) {
-  return joint.on_body1.body == kGround ? joint.on_body1 : joint.on_body2;
-}
-
 struct DrawnSketch {
   const DrawnState& state;
   Sketch sketch;
 
   Point3 at(const SketchPoint& p) const { return placed(state.row, p); }
+  std::vector<Point2> outline_of(std::size_t body, const std::vector<Point3>& points, const auto& view) const {
+    std::vector<Point2> pixels;
+    for (const Point3& s : points) pixels.push_back(view(at({body, s})));
+    return outline(std::move(pixels));
+  }
 };
 
 // Returns nullopt if a position in the drawing or its width [m] overflows.
@@ -91,10 +90,15 @@ std::optional<View> view_of(std::array<int, 2> plane, const std::vector<DrawnSke
     finite = finite && view.flat(p).allFinite();
   };
   for (const DrawnSketch& one : drawn) {
-    for (std::size_t i = 0; i < one.sketch.bodies.size(); ++i)
-      for (const Point3& s : one.sketch.bodies[i]) extend(one.at({i, s}));
-    for (const SketchedJoint& joint : one.sketch.joints) extend(one.at(drawn_point(joint)));
-    for (const SketchedSpring& spring : one.sketch.springs) extend(one.at(spring.from)), extend(one.at(spring.to));
+    for (std::size_t i = 0; i < one.sketch.bodies.size(); ++i) {
+      for (const Point3& s : one.sketch.bodies[i].points) extend(one.at({i, s}));
+      for (const std::vector<Point3>& hull : one.sketch.bodies[i].hulls)
+        for (const Point3& s : hull) extend(one.at({i, s}));
+    }
+    for (const SketchedMark& mark : one.sketch.marks) {
+      extend(one.at(mark.at));
+      if (mark.to) extend(one.at(*mark.to));
+    }
   }
   const double width = std::max(box.sizes().x(), 1e-12), height = std::max(box.sizes().y(), 1e-12);
   view.scale = std::min((kWidth - 2 * kMargin) / width, (kLargestHeight - 2 * kMargin - kTitle) / height);
@@ -109,37 +113,27 @@ std::string path_through(const std::vector<Point2>& pixels, bool closed) {
   std::string d;
   for (std::size_t i = 0; i < pixels.size(); ++i)
     d += fmt::format("{}{:.1f} {:.1f}", i == 0 ? 'M' : 'L', pixels[i].x(), pixels[i].y());
-  return closed ? d + "Z" : d;
+  return closed ? d + "Z" : pixels.size() == 1 ? d + "h0" : d;
 }
 
-// A coil as in script/symbols.js: seen from the side, and a little from the end.
-std::string coil(const Point2& from, const Point2& to) {
-  constexpr int kTurns = 10, kSamples = 12;  // of a turn
-  constexpr double kRadius = 5;              // [px]
-  const Point2 along = to - from;
-  const double length = along.norm();
-  if (!(length > 0)) return path_through({from, to}, false);
-  const Point2 forward = along / length, across(-forward.y(), forward.x());
-  std::vector<Point2> pixels{from};
-  for (int i = 0; i <= kTurns * kSamples; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kSamples;
-    pixels.push_back(from + (0.15 + 0.7 * i / (kTurns * kSamples)) * along +
-                     kRadius * ((0.5 - 0.5 * std::cos(angle)) * forward + std::sin(angle) * across));
-  }
-  pixels.push_back(to);
-  return path_through(pixels, false);
+// Puts x along the axis of a mark, or stretches it to its other end.
+std::string transform_of(const SketchedMark& mark, const DrawnSketch& drawn, const View& view) {
+  const Point2 at = view(drawn.at(mark.at));
+  if (mark.radius > 0)
+    return fmt::format("translate({:.1f} {:.1f}) scale({:.4g})", at.x(), at.y(), mark.radius * view.scale);
+  Point2 along(1, 0);
+  if (mark.to) along = view(drawn.at(*mark.to)) - at;
+  if (mark.axis) along = view.flat(turned(drawn.state.row, *mark.axis)).cwiseProduct(Point2(1, -1));
+  const Point2 forward = along.norm() > 1e-9 ? Point2(along.normalized()) : Point2(1, 0),
+               x = mark.to || mark.foreshortened ? along : forward;
+  return fmt::format("matrix({:.4g} {:.4g} {:.4g} {:.4g} {:.1f} {:.1f})", x.x(), x.y(), -forward.y(), forward.x(),
+                     at.x(), at.y());
 }
 
 Point2 middle_of(const std::vector<Point2>& points) {
   Point2 middle(0, 0);
   for (const Point2& p : points) middle += p / static_cast<double>(points.size());
   return middle;
-}
-
-std::vector<Point2> outline_of(const DrawnSketch& drawn, std::size_t body, const View& view) {
-  std::vector<Point2> pixels;
-  for (const Point3& s : drawn.sketch.bodies[body]) pixels.push_back(view(drawn.at({body, s})));
-  return outline(std::move(pixels));
 }
 
 // A name beside a body. Beside a bar its nearest corner is kGap off the bar, on the side away from `other`.
@@ -163,22 +157,21 @@ std::string name_beside(const std::vector<Point2>& hull, const Point2& other, co
 void draw_state(const DrawnSketch& drawn, const DrawnSketch& first, const View& view, bool last, std::string& svg) {
   const auto& [state, sketch] = drawn;
   svg += last ? "<g>\n" : "<g class=\"earlier\">\n";
-  for (const SketchedSpring& spring : sketch.springs)
-    svg += fmt::format("<path class=\"spring\" d=\"{}\"/>\n",
-                       coil(view(drawn.at(spring.from)), view(drawn.at(spring.to))));
   for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
-    const std::vector<Point2> hull = outline_of(drawn, i, view);
-    svg += fmt::format("<path class=\"body c{0} f{0}\" d=\"{1}\"/>\n", i % kBodyColours,
-                       hull.size() == 1 ? path_through(hull, false) + "h0" : path_through(hull, hull.size() > 2));
+    const SketchedBody& body = sketch.bodies[i];
+    for (const std::vector<Point3>& points : body.hulls) {
+      const std::vector<Point2> hull = drawn.outline_of(i, points, view);
+      svg += fmt::format("<path class=\"body {0}c{1} f{1}\" d=\"{2}\"/>\n", body.solid ? "solid " : "",
+                         i % kBodyColours, path_through(hull, hull.size() > 2));
+    }
     if (last && sketch.bodies.size() <= kMostNames)
-      svg += name_beside(hull, middle_of(outline_of(first, i, view)), state.scene.bodies[i].name);
+      svg +=
+          name_beside(drawn.outline_of(i, body.points, view),
+                      middle_of(first.outline_of(i, first.sketch.bodies[i].points, view)), state.scene.bodies[i].name);
   }
-  for (const SketchedJoint& joint : sketch.joints) {
-    const Point2 p = view(drawn.at(drawn_point(joint)));
-    if (drawn_point(joint).body == kGround)
-      svg += fmt::format("<path class=\"ground\" d=\"M{0:.1f} {1:.1f}l-7 12h14Z\"/>\n", p.x(), p.y());
-    svg += fmt::format("<circle class=\"joint\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\"/>\n", p.x(), p.y());
-  }
+  for (const SketchedMark& mark : sketch.marks)
+    svg += fmt::format("<path class=\"mark {}\" transform=\"{}\" d=\"{}\"/>\n", mark.style,
+                       transform_of(mark, drawn, view), mark.path);
   svg += "</g>\n";
 }
 
@@ -193,7 +186,7 @@ void draw_scale(const View& view, std::string& svg) {
 
 }  // namespace
 
-std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory) {
+MotionPlane plane_of_motion(const Scene& scene, const Trajectory& trajectory) {
   constexpr std::size_t kInstants = 50;
   constexpr double kStandstill = 1e-6;  // of the spread: smaller motion is rounding
   const Sketch sketch = sketch_of(scene);
@@ -201,7 +194,7 @@ std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& traject
   Point3 motion = Point3::Zero();  // largest way of a point along each axis
   const std::size_t stride = std::max<std::size_t>(1, trajectory.rows.size() / kInstants);
   for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
-    for (const Point3& s : sketch.bodies[i]) {
+    for (const Point3& s : sketch.bodies[i].points) {
       Eigen::AlignedBox3d way;
       for (std::size_t row = 0; row < trajectory.rows.size(); row += stride)
         way.extend(placed(trajectory.rows[row], {i, s}));
@@ -211,13 +204,22 @@ std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& traject
     }
   }
   const Point3 spread = all.isEmpty() ? Point3::Zero() : Point3(all.sizes());
+  const double least = kStandstill * spread.maxCoeff();
   std::array<int, 3> axes{0, 1, 2};
   std::stable_sort(axes.begin(), axes.end(), [&](int a, int b) {
-    const double least = kStandstill * spread.maxCoeff();
     const bool still = motion(a) <= least && motion(b) <= least;
     return still ? spread(a) > spread(b) : motion(a) > motion(b);
   });
-  return {std::min(axes[0], axes[1]), std::max(axes[0], axes[1])};
+  // A body whose points lie on its axis turns without moving them. Its angular velocity points along the normal.
+  const auto turns_in_plane = [&](const std::vector<double>& row) {
+    for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
+      const Point3 omega(row.data() + 11 + 13 * i), along = omega(axes[2]) * Point3::Unit(axes[2]);
+      if ((omega - along).norm() > kStandstill * (1 + along.norm())) return false;
+    }
+    return true;
+  };
+  return {{std::min(axes[0], axes[1]), std::max(axes[0], axes[1])},
+          motion(axes[2]) <= least && std::ranges::all_of(trajectory.rows, turns_in_plane)};
 }
 
 std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane,

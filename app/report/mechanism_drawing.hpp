@@ -1,9 +1,9 @@
-// A sketch of a mechanism: bodies as the hulls of their points, joints as circles, springs as zigzags. It is projected
-// on the coordinate plane in which the mechanism moves most. Several states lie on top of each other, all but the last
-// one dashed.
+// A sketch of a mechanism (mechanism_sketch.hpp), projected on the coordinate plane in which the mechanism moves most.
+// Several states lie on top of each other, all but the last one dashed.
 //
-//   const std::array<int, 2> plane = plane_of_motion(scene, trajectory);
-//   page.drawing(mechanism_drawing("start and end", plane, {{"start", scene, first_row}, {"end", scene, last_row}}));
+//   const MotionPlane plane = plane_of_motion(scene, trajectory);
+//   page.drawing(mechanism_drawing("start and end", plane.axes, {{"start", scene, first_row}, {"end", scene,
+//   last_row}}));
 #pragma once
 
 #include <array>
@@ -21,7 +21,11 @@ struct DrawnState {
 };
 
 // The two axes (0, 1, 2) along which the bodies' points move most. If they move along fewer, their spread decides.
-std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory);
+struct MotionPlane {
+  std::array<int, 2> axes;
+  bool holds_all;  // no point moves along the third axis
+};
+MotionPlane plane_of_motion(const Scene& scene, const Trajectory& trajectory);
 
 // SVG text; empty if there is no state, or if a distance in it overflows.
 std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane,

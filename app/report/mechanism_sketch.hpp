@@ -1,4 +1,5 @@
-// The parts of a mechanism that drawings show: points of its bodies, joints, springs and dampers, points of sensors.
+// What drawings of a mechanism show: hulls of its bodies, marks (joints, springs, dampers, the ground) at points,
+// points whose paths are drawn. mechanism_drawing.hpp draws it at some instants, script/viewer.js moves it.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,15 +21,20 @@ struct SketchPoint {
   bool operator==(const SketchPoint&) const = default;
 };
 
-struct SketchedJoint {
-  std::string type;
-  SketchPoint on_body1, on_body2;
-  std::optional<Eigen::Vector3d> axis;  // in body 1
+struct SketchedBody {
+  std::vector<Eigen::Vector3d> points;              // of joints, forces, sensors, shapes, and its own
+  std::vector<std::vector<Eigen::Vector3d>> hulls;  // convex: of each shape but spheres, else of its points
+  bool solid = false;                               // has shapes
 };
 
-struct SketchedSpring {
-  SketchPoint from, to;
-  bool spring, damper;  // whether each of them acts
+// A path of SVG about a point [px].
+struct SketchedMark {
+  std::string style, path;  // style: its class
+  SketchPoint at;
+  std::optional<SketchPoint> to = {};    // x from 0 to 1 is stretched to this point
+  std::optional<SketchPoint> axis = {};  // else x is turned to this unit vector of a body
+  bool foreshortened = false;            // x is also shortened as a projection of the axis
+  double radius = 0;                     // else x and y are in units of this length [m]
 };
 
 // The point of a position sensor, whose path is drawn.
@@ -37,19 +43,10 @@ struct TracedPoint {
   SketchPoint point;
 };
 
-struct SketchedShape {
-  std::size_t body;
-  std::string type;
-  Eigen::Vector3d from, to;
-  double radius;
-};
-
 struct Sketch {
-  std::vector<std::vector<Eigen::Vector3d>> bodies;  // points of each
-  std::vector<SketchedJoint> joints;
-  std::vector<SketchedSpring> springs;
+  std::vector<SketchedBody> bodies;
+  std::vector<SketchedMark> marks;
   std::vector<TracedPoint> traces;
-  std::vector<SketchedShape> shapes;
 };
 
 // Takes the values of the scene's parameters.
@@ -58,7 +55,8 @@ Sketch sketch_of(const Scene& scene);
 // A point of a body of the scene, or of the ground.
 SketchPoint point_of(const Scene& scene, const std::string& body, const PointField& point);
 
-// Global position of a point, from a trajectory's row: t, then 13 numbers per body.
+// Global position of a point, from a trajectory's row: t, then 13 numbers per body; a direction is only turned.
 Eigen::Vector3d placed(const std::vector<double>& row, const SketchPoint& p);
+Eigen::Vector3d turned(const std::vector<double>& row, const SketchPoint& direction);
 
 }  // namespace mbsopt::inline app

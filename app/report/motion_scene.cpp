@@ -1,12 +1,12 @@
 #include "app/report/motion_scene.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <tuple>
 
-#include "app/report/html_text.hpp"
 #include "app/report/mechanism_sketch.hpp"
 #include "app/report/motion_plots.hpp"
 #include "core/scene/scene_facts.hpp"
@@ -17,13 +17,28 @@ namespace {
 constexpr std::size_t kMostNumbers = 20'000;  // of all poses: some 200 kB of the page
 constexpr std::size_t kFewestRows = 60;       // fewer rows do not show a smooth motion
 constexpr std::size_t kPose = 7;              // x y z e0 e1 e2 e3
+constexpr int kTimeDigits = 9;                // 1000.001 s and 1000.002 s are two instants
 
-std::string vector_of(const Eigen::Vector3d& v) { return fmt::format("[{:.6g},{:.6g},{:.6g}]", v.x(), v.y(), v.z()); }
+// Numbers with so many digits; null stands for one that is not finite.
+Json rounded(double x, int digits = 6) {
+  return std::isfinite(x) ? Json(std::strtod(fmt::format("{:.{}g}", x, digits).c_str(), nullptr)) : Json();
+}
+Json rounded(const auto& numbers, int digits = 6) {
+  Json list = Json::array();
+  for (const double x : numbers) list.push_back(rounded(x, digits));
+  return list;
+}
 
-// "b": the body's number, -1 for the ground; "p": the point in its frame. end: "", or "1" and "2".
-std::string point_json(const SketchPoint& p, const char* end = "") {
-  return fmt::format(R"("b{0}":{1},"p{0}":{2})", end, p.body == kGround ? -1 : static_cast<long>(p.body),
-                     vector_of(p.s));
+template <class Items>
+Json json_list(const Items& items, const auto& json_of) {
+  Json list = Json::array();
+  for (const auto& item : items) list.push_back(json_of(item));
+  return list;
+}
+
+// "b": the body's number, -1 for the ground; "p": the point in its frame.
+Json point_json(const SketchPoint& p) {
+  return {{"b", p.body == kGround ? -1 : static_cast<long>(p.body)}, {"p", rounded(p.s)}};
 }
 
 // Every second, third, ... row, so that at most `most` are left, and the last one.
@@ -35,11 +50,10 @@ Trajectory thinned(const Trajectory& all, std::size_t most) {
   return kept;
 }
 
-// A constant coordinate is a number; another one is the number of its array in brackets.
-std::string coordinate(PageArrays& arrays, const std::vector<double>& values) {
+// A coordinate over time; one number if it is constant.
+Json coordinate(const std::vector<double>& values) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  if (*high - *low < 1e-12) return fmt::format("{:.6g}", values.front());
-  return fmt::format("[{}]", arrays.add(values));
+  return *high - *low < 1e-12 ? rounded(values.front()) : rounded(values);
 }
 
 // Returns whether the columns of time and poses are finite. A sensor may have no value.
@@ -50,14 +64,12 @@ bool poses_are_finite(const MovingState& state) {
   });
 }
 
-std::string targets_json(PageArrays& arrays, const std::vector<PointTarget>& targets) {
-  return json_list(targets, [&](const PointTarget& target) {
-    const std::string place = json_list(target.place, [&](const std::vector<double>& x) {
-      return x.empty() ? std::string("null") : std::to_string(arrays.add(x));
-    });
-    return fmt::format(R"({{"measured":{},{},"t":{},"place":{}}})", target.measured, point_json(target.point),
-                       arrays.add(target.t, 9), place);
-  });
+Json target_json(const PointTarget& target) {
+  const auto place = [](const std::vector<double>& x) { return x.empty() ? Json() : rounded(x); };
+  return {{"measured", target.measured},
+          {"at", point_json(target.point)},
+          {"t", rounded(target.t, kTimeDigits)},
+          {"place", json_list(target.place, place)}};
 }
 
 // The size that 98 % of the forces do not exceed; the others, as at singular positions, would hide them. It is 0
@@ -74,80 +86,71 @@ double large_force(const Trajectory& forces) {
   return sizes[static_cast<std::size_t>(place)];
 }
 
-// Writes null without forces.
-std::string reactions_json(PageArrays& arrays, const MovingState& state) {
+// Null without forces.
+Json reactions_json(const MovingState& state) {
   const Trajectory& forces = state.forces;
   const double large = large_force(forces);
-  if (large == 0) return "null";
-  std::vector<std::string> joints;
+  if (large == 0) return {};
+  Json joints = Json::array();
   for (std::size_t k = 1; k + 2 < forces.columns.size(); k += 3) {
     const std::string name = forces.columns[k].substr(0, forces.columns[k].size() - 2);  // "A.x"
     const auto joint = std::ranges::find(state.scene.joints, name, &Joint::name);
     if (joint == state.scene.joints.end()) continue;
-    joints.push_back(fmt::format(
-        R"({{{},"force":[{},{},{}]}})", point_json(point_of(state.scene, joint->body2, joint->point2)),
-        arrays.add(column(forces, k)), arrays.add(column(forces, k + 1)), arrays.add(column(forces, k + 2))));
+    joints.push_back({{"at", point_json(point_of(state.scene, joint->body2, joint->point2))},
+                      {"force", json_list(std::array{k, k + 1, k + 2},
+                                          [&](std::size_t column_of) { return rounded(column(forces, column_of)); })}});
   }
-  return fmt::format(R"({{"t":{},"large":{:.6g},"joints":[{}]}})", arrays.add(column(forces, 0), 9), large,
-                     fmt::join(joints, ","));
+  return {{"t", rounded(column(forces, 0), kTimeDigits)}, {"large", rounded(large)}, {"joints", joints}};
 }
 
-std::string state_json(PageArrays& arrays, const MovingState& state, std::size_t most) {
+Json points_json(std::vector<Eigen::Vector3d> points) {
+  const auto coordinates = [](const Eigen::Vector3d& p) { return std::tuple(p.x(), p.y(), p.z()); };
+  std::ranges::sort(points, {}, coordinates);
+  const auto [same, end] = std::ranges::unique(points, {}, coordinates);
+  points.erase(same, end);
+  return json_list(points, [](const Eigen::Vector3d& p) { return rounded(p); });
+}
+
+Json state_json(const MovingState& state, std::size_t most) {
   const Sketch sketch = sketch_of(state.scene);
   const Trajectory shown = thinned(state.trajectory, most);
-  std::vector<std::string> bodies;
+  Json bodies = Json::array();
   for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
-    std::vector<std::string> points, shapes, row;
-    for (const Eigen::Vector3d& s : sketch.bodies[i]) points.push_back(vector_of(s));
-    for (const SketchedShape& shape : sketch.shapes)
-      if (shape.body == i)
-        shapes.push_back(fmt::format(R"({{"type":{},"from":{},"to":{},"radius":{:.6g}}})", json_quoted(shape.type),
-                                     vector_of(shape.from), vector_of(shape.to), shape.radius));
-    std::sort(points.begin(), points.end());
-    points.erase(std::unique(points.begin(), points.end()), points.end());
-    for (std::size_t k = 0; k < kPose; ++k) row.push_back(coordinate(arrays, column(shown, 1 + 13 * i + k)));
-    bodies.push_back(fmt::format(R"({{"name":{},"points":[{}],"shapes":[{}],"row":[{}]}})",
-                                 json_quoted(state.scene.bodies[i].name), fmt::join(points, ","),
-                                 fmt::join(shapes, ","), fmt::join(row, ",")));
+    const SketchedBody& body = sketch.bodies[i];
+    Json pose = Json::array();
+    for (std::size_t k = 0; k < kPose; ++k) pose.push_back(coordinate(column(shown, 1 + 13 * i + k)));
+    bodies.push_back({{"name", state.scene.bodies[i].name},
+                      {"points", points_json(body.points)},
+                      {"hulls", json_list(body.hulls, points_json)},
+                      {"solid", body.solid},
+                      {"pose", pose}});
   }
-  const auto joint_json = [](const SketchedJoint& joint) {
-    return fmt::format(R"({{"type":{},{},{},"axis":{}}})", json_quoted(joint.type), point_json(joint.on_body1, "1"),
-                       point_json(joint.on_body2, "2"), joint.axis ? vector_of(*joint.axis) : "null");
-  };
-  const auto spring_json = [](const SketchedSpring& spring) {
-    return fmt::format(R"({{{},{},"spring":{},"damper":{}}})", point_json(spring.from, "1"), point_json(spring.to, "2"),
-                       spring.spring, spring.damper);
+  const auto optional_point = [](const std::optional<SketchPoint>& p) { return p ? point_json(*p) : Json(); };
+  const auto mark_json = [&](const SketchedMark& mark) {
+    return Json{{"style", mark.style},
+                {"path", mark.path},
+                {"at", point_json(mark.at)},
+                {"to", optional_point(mark.to)},
+                {"axis", optional_point(mark.axis)},
+                {"foreshortened", mark.foreshortened},
+                {"radius", rounded(mark.radius)}};
   };
   const auto trace_json = [](const TracedPoint& trace) {
-    return fmt::format(R"({{"name":{},{}}})", json_quoted(trace.name), point_json(trace.point));
+    return Json{{"name", trace.name}, {"at", point_json(trace.point)}};
   };
-  return fmt::format(
-      R"({{"name":{},"ghost":{},"t":{},"bodies":[{}],"joints":{},"springs":{},"traces":{},"targets":{},"reactions":{}}})",
-      json_quoted(state.name), state.ghost, arrays.add(column(shown, 0), 9), fmt::join(bodies, ","),
-      json_list(sketch.joints, joint_json), json_list(sketch.springs, spring_json),
-      json_list(sketch.traces, trace_json), targets_json(arrays, state.targets), reactions_json(arrays, state));
-}
-
-// Returns whether all points stay in planes of that normal.
-bool moves_in(std::array<int, 2> plane, const Scene& scene, const Trajectory& trajectory) {
-  constexpr double kStandstill = 1e-6;  // [m] per metre of the largest distance
-  const auto normal = static_cast<std::size_t>(3 - plane[0] - plane[1]);
-  double leaves = 0, largest = 1e-3;
-  for (const std::vector<double>& row : trajectory.rows) {
-    for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-      const double *const now = row.data() + 1 + 13 * i, *const first = trajectory.rows.front().data() + 1 + 13 * i;
-      for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, std::abs(now[k]));
-      leaves = std::max({leaves, std::abs(now[normal] - first[normal])});
-      for (std::size_t k = 0; k < 3; ++k)  // the angular velocity points along the normal
-        if (k != normal && std::abs(now[10 + k]) > 1e-6 * (1 + std::abs(now[10 + normal]))) return false;
-    }
-  }
-  return leaves <= kStandstill * largest;
+  return {{"name", state.name},
+          {"ghost", state.ghost},
+          {"t", rounded(column(shown, 0), kTimeDigits)},
+          {"bodies", bodies},
+          {"marks", json_list(sketch.marks, mark_json)},
+          {"traces", json_list(sketch.traces, trace_json)},
+          {"targets", json_list(state.targets, target_json)},
+          {"reactions", reactions_json(state)}};
 }
 
 }  // namespace
 
-std::string motion_scene(PageArrays& arrays, std::array<int, 2> plane, const std::vector<MovingState>& states) {
+Json motion_scene(const MotionPlane& plane, const std::vector<MovingState>& states) {
   std::size_t bodies = 0, rows = 0;
   for (const MovingState& state : states) {
     if (state.trajectory.rows.size() < 2 || !poses_are_finite(state)) return {};
@@ -156,19 +159,14 @@ std::string motion_scene(PageArrays& arrays, std::array<int, 2> plane, const std
   }
   if (bodies == 0) return {};
   const std::size_t most = std::max(kFewestRows, kMostNumbers / (kPose * bodies));
-  std::vector<std::string> parts;
-  bool planar = true;
-  for (const MovingState& state : states) {
-    parts.push_back(state_json(arrays, state, most));
-    planar = planar && moves_in(plane, state.scene, state.trajectory);
-  }
   const auto g = SceneFacts(states.front().scene).value(states.front().scene.gravity);
-  const std::string note = rows > most ? fmt::format("The motion shows every {}th of {} rows of trajectory.csv.",
-                                                     (rows + most - 1) / most, rows)
-                                       : std::string();
-  return fmt::format(R"({{"planar":{},"plane":[{},{}],"gravity":{},"note":{},"states":[{}]}})", planar, plane[0],
-                     plane[1], g ? vector_of({(*g)[0], (*g)[1], (*g)[2]}) : "[0,0,0]", json_quoted(note),
-                     fmt::join(parts, ",\n"));
+  return {{"planar", plane.holds_all},
+          {"plane", plane.axes},
+          {"gravity", g ? rounded(*g) : Json{0, 0, 0}},
+          {"note", rows > most ? fmt::format("The motion shows every {}th of {} rows of trajectory.csv.",
+                                             (rows + most - 1) / most, rows)
+                               : std::string()},
+          {"states", json_list(states, [&](const MovingState& state) { return state_json(state, most); })}};
 }
 
 }  // namespace mbsopt::inline app

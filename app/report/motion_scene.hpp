@@ -1,15 +1,14 @@
 // A mechanism over time, as JSON for script/viewer.js: poses of its bodies, points, joints, springs, paths,
 // prescribed and measured places, forces of joints.
 //
-//   page.motion(motion_scene(page.arrays(), plane, {{"before", scene, before, true}, {"after", designed, after}}),
-//   stills);
+//   page.motion(motion_scene(plane, {{"before", scene, before, true}, {"after", designed, after}}), stills);
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
-#include "app/report/html_text.hpp"
+#include "app/files/json_text.hpp"
+#include "app/report/mechanism_drawing.hpp"
 #include "app/report/point_targets.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "core/scene/scene.hpp"
@@ -25,8 +24,8 @@ struct MovingState {
   Trajectory forces = {};  // of joints (joint_forces.hpp)
 };
 
-// The view first shows plane if the mechanism moves in no other direction. Returns an empty string if a state has less
-// than two rows or a number in it is not finite.
-std::string motion_scene(PageArrays& arrays, std::array<int, 2> plane, const std::vector<MovingState>& states);
+// The view first shows the plane if it holds all motion. Returns null if a state has less than two
+// rows or a number in it is not finite.
+Json motion_scene(const MotionPlane& plane, const std::vector<MovingState>& states);
 
 }  // namespace mbsopt::inline app

@@ -1,7 +1,7 @@
 // Prescribed or measured positions of points of a mechanism, for script/viewer.js.
 //
 //   const std::vector<PointTarget> targets = prescribed_points(problem);
-//   page.motion(motion_scene(page.arrays(), plane, {{.name = "a", .scene = scene, .targets = targets, ...}}), stills);
+//   page.motion(motion_scene(plane, {{.name = "a", .scene = scene, .targets = targets, ...}}), stills);
 #pragma once
 
 #include <array>

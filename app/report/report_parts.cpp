@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "app/report/line_plot.hpp"
+#include "app/report/mechanism_drawing.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/run/run.hpp"
@@ -288,10 +289,21 @@ void add_multistart(HtmlPage& page, const Scene& scene, const Json& result) {
   page.table({"best start", "starts that ended there", "objective"}, optima);
 }
 
-void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
-                const std::string& stills) {
-  const std::string motion = motion_scene(page.arrays(), plane, states);
-  motion.empty() ? page.drawing(stills) : page.motion(motion, stills);
+void add_motion(HtmlPage& page, const std::vector<MovingState>& states) {
+  if (std::ranges::any_of(states, [](const MovingState& state) { return state.trajectory.rows.empty(); })) return;
+  const MovingState& last = states.back();
+  const MotionPlane plane = plane_of_motion(last.scene, last.trajectory);
+  const bool alone = states.size() == 1;  // then one drawing shows both ends
+  std::vector<DrawnState> starts, ends;
+  for (const MovingState& state : states) {
+    starts.push_back({alone ? "start" : state.name, state.scene, state.trajectory.rows.front()});
+    (alone ? starts : ends).push_back({alone ? "end" : state.name, state.scene, state.trajectory.rows.back()});
+  }
+  const std::string stills =
+      mechanism_drawing(alone ? "The mechanism at start and end" : "At the start", plane.axes, starts) +
+      mechanism_drawing("At the end", plane.axes, ends);
+  Json motion = motion_scene(plane, states);
+  motion.is_null() ? page.drawing(stills) : page.motion(std::move(motion), stills);
 }
 
 void add_provenance(HtmlPage& page, const Json& result) {

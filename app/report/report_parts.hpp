@@ -47,9 +47,8 @@ struct Between {
 std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p);
 inline constexpr const char* kBetween = "place between the bounds, on the scale of the parameter [-]";
 
-// A moving mechanism above its drawings at start and end.
-void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
-                const std::string& stills);
+// The moving mechanism, above drawings of its start and end that replace it without a script.
+void add_motion(HtmlPage& page, const std::vector<MovingState>& states);
 void add_provenance(HtmlPage& page, const Json& result);
 // Adds bodies, equations, degrees of freedom where the result has them, and the provenance. Returns the whole page.
 std::string finished(HtmlPage& page, const Json& result);

@@ -94,7 +94,7 @@ std::string run_index(const fs::path& folder) {
     compared.push_back({{"name", run.folder}, {"numbers", compared_numbers(run.result)}});
   }
   page.table({"folder", "command", "status", "warnings"}, rows);
-  if (runs.size() > 1) page.comparison(json_text(compared));
+  if (runs.size() > 1) page.comparison(std::move(compared));
   return page.text();
 }
 

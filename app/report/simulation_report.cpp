@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "app/report/mechanism_drawing.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/run_report.hpp"
@@ -66,12 +65,7 @@ std::string simulation_report(const Scene& scene, const Json& result, const Traj
   add_status(page, result);
   add_objectives(page, result);
   page.heading("Motion");
-  if (!trajectory.rows.empty()) {
-    const std::array<int, 2> plane = plane_of_motion(scene, trajectory);
-    add_motion(page, plane, {{scene.name, scene, trajectory, false, parts.targets, parts.forces}},
-               mechanism_drawing("The mechanism at start and end", plane,
-                                 {{"start", scene, trajectory.rows.front()}, {"end", scene, trajectory.rows.back()}}));
-  }
+  add_motion(page, {{scene.name, scene, trajectory, false, parts.targets, parts.forces}});
   for (LinePlot& plot : motion_plots(scene, trajectory)) {
     plot.instants = parts.instants;
     page.plot(plot);

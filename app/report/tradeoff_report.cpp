@@ -25,7 +25,7 @@ void add_reference(HtmlPage& page, const Json& result, const TradeoffReference& 
   page.heading("Reference");
   page.paragraph(fmt::format("{}, certified by {}: smaller errors than the difference of these two cannot be measured.",
                              in_words(reference.first), in_words(reference.second)));
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
   for (const Quantity& q : reference.errors->quantities())
     rows.push_back({q.name, q.relative ? "relative" : "absolute", error_text(q.certificate)});
   page.table({"quantity", "errors are", "two methods apart"}, rows);
@@ -146,10 +146,11 @@ void add_plots(HtmlPage& page, const Json& result, const Tradeoff& tradeoff, con
 void add_recommendations(HtmlPage& page, const Json& result) {
   if (!result.contains("recommendations")) return;
   page.heading("What to use");
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
   for (const char* list : {"recommendations", "task_recommendations"})
     for (const Json& r : result.value(list, Json::array()))
-      rows.push_back({r.at("aim"), fmt::format("{:.0e}", r.at("accuracy").get<double>()), r.at("setting_in_words")});
+      rows.push_back(
+          {cell(r.at("aim")), fmt::format("{:.0e}", r.at("accuracy").get<double>()), cell(r.at("setting_in_words"))});
   page.table({"quantity", "accuracy", "fastest setting"}, rows);
   if (result.contains("applied") && result.at("applied").contains("setting"))
     page.paragraph("Applied in recommended.json, " + result.at("applied").at("in_words").get<std::string>() + ".");
@@ -161,18 +162,18 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
   std::vector<std::string> header{"setting", "time [ms]", "repetitions", "steps", "right-hand sides", "factorisations"};
   const std::vector<Quantity>& quantities = tradeoff.quantities();
   for (const Quantity& q : quantities) header.push_back(q.name);
-  std::vector<std::vector<std::string>> rows, without;  // without: settings that have no result
+  std::vector<TableRow> rows, without;  // without: settings that have no result
   for (const TradeoffRow& r : tradeoff.rows) {
     if (!r.ok()) {
       without.push_back({in_words(r.setting), std::string(to_string(r.status)), r.message});
       continue;
     }
-    std::vector<std::string> row{in_words(r.setting),
-                                 fmt::format("{:.3g}", 1e3 * r.wall_seconds),
-                                 std::to_string(r.runs.size()),
-                                 std::to_string(r.statistics.steps),
-                                 std::to_string(r.statistics.rhs_evaluations),
-                                 std::to_string(r.statistics.factorisations)};
+    TableRow row{in_words(r.setting),
+                 fmt::format("{:.3g}", 1e3 * r.wall_seconds),
+                 std::to_string(r.runs.size()),
+                 std::to_string(r.statistics.steps),
+                 std::to_string(r.statistics.rhs_evaluations),
+                 std::to_string(r.statistics.factorisations)};
     for (std::size_t q = 0; q < quantities.size(); ++q) {
       const bool front = q < r.pareto.size() && r.pareto[q];
       const auto column = static_cast<Eigen::Index>(q);
@@ -232,7 +233,7 @@ std::string penalty_report(const Json& result, const PenaltyStudy& study) {
            {{"penalty against the constrained equations", &PenaltyStudyRow::model_error, Mark::line},
             {"rounding by Cholesky", &PenaltyStudyRow::rounding_error, Mark::line},
             {"augmented Lagrangian", &PenaltyStudyRow::augmented_error, Mark::dashed}});
-  std::vector<std::vector<std::string>> rows, runs;
+  std::vector<TableRow> rows, runs;
   for (const PenaltyStudyRow& row : study.rows) {
     const std::string alpha = fmt::format("{:.0e}", row.alpha);
     rows.push_back(

@@ -31,14 +31,9 @@ WIDTHS = (420, 1300)
 PROBE = r"""
 const found = {errors: window.probe_errors, plots: 0, cells_outside: 0, overflow: 0, small: 0};
 const wait = ms => new Promise(done => setTimeout(done, ms));
-const ink = canvas => {
-  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d", {willReadFrequently: true});
-  copy.drawImage(canvas, 0, 0);
-  const d = copy.getImageData(0, 0, canvas.width, canvas.height).data;
-  let sum = 0, hash = 0;
-  for (let i = 3; i < d.length; i += 4) if (d[i]) sum += 1, hash = (hash * 31 + i) % 1000003;
-  return [sum, hash];
-};
+// The parts of a mechanism in sight.
+const drawn = viewer => [...viewer.querySelectorAll("path:not([visibility=hidden])")].map(
+  e => e.getAttribute("d") + e.getAttribute("transform"));
 (async () => {
   await wait(200);
   const chosen = [...document.querySelectorAll("[data-keys]")];
@@ -73,14 +68,16 @@ const ink = canvas => {
   // A plot in sight is as wide as its place: it neither scrolls nor is cut.
   found.cut = [...document.querySelectorAll("figure")].filter(f => f.scrollWidth > f.clientWidth + 1).length;
   found.expected_plots = document.querySelectorAll("figure[data-plot]").length;
-  const canvas = document.querySelector(".viewer canvas");
-  if (canvas) {
-    const [before, first] = ink(canvas), slider = document.querySelector(".viewer input[type=range]");
+  const viewer = document.querySelector(".viewer>svg");
+  if (viewer) {
+    const before = drawn(viewer), slider = document.querySelector(".viewer input[type=range]");
     slider.value = 430;
     slider.dispatchEvent(new Event("input"));
-    const [after, second] = ink(canvas);
-    found.ink = Math.min(before, after), found.moved = first != second;
-    found.cursors = document.querySelectorAll("path.cursor[d^=M]").length;
+    const after = drawn(viewer), box = viewer.getBoundingClientRect();
+    const bodies = [...viewer.querySelectorAll(".body")].map(e => e.getBoundingClientRect());
+    found.drawn = bodies.length && bodies.every(b => b.left > box.left && b.right < box.right) && !/NaN/.test(after);
+    found.moved = before.join() != after.join();
+    found.cursors = document.querySelectorAll(".cursor:not([visibility=hidden])").length;
   }
   found.compared = document.querySelectorAll("[data-comparison] tbody tr").length;
   // A page that is wider than its window scrolls sideways.
@@ -170,7 +167,7 @@ def problems_of(found, console, moves, width):
     wrong = [f"console: {line}" for line in console] + [f"error: {e}" for e in found["errors"]]
     if found["plots"] != found["expected_plots"]:
         wrong.append(f"{found['plots']} of {found['expected_plots']} plots show values")
-    if moves and found.get("ink", 0) < 500:
+    if moves and not found.get("drawn"):
         wrong.append("the mechanism is not drawn")
     if moves and not found.get("moved"):
         wrong.append("the slider does not move the mechanism")

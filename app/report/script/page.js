@@ -1,12 +1,13 @@
 // What the scripts of a report share: its data, elements of the page, numbers as text, the instant that it shows. The
 // page holds its data in the JSON block "data" (html_page.cpp, motion_scene.cpp). Nothing is loaded.
 const data = JSON.parse(document.getElementById("data").textContent);
-const array = k => data.arrays[k];
 document.documentElement.classList.add("scripted");
 
-// An element with attributes and children. Within a plot, the namespace is that of its drawing.
-function element(tag, attributes = {}, children = [], namespace = null) {
-  const e = namespace ? document.createElementNS(namespace, tag) : document.createElement(tag);
+// An element with attributes and children, of the page or of a drawing.
+const element = (tag, attributes, children) => filled(document.createElement(tag), attributes, children);
+const drawings = Object.assign(document.createElement("div"), {innerHTML: "<svg></svg>"}).firstChild.namespaceURI;
+const svg = (tag, attributes, children) => filled(document.createElementNS(drawings, tag), attributes, children);
+function filled(e, attributes = {}, children = []) {
   set(e, attributes);
   e.append(...children);
   return e;

@@ -42,14 +42,18 @@ function samples(path) {
   return {x, y, sorted: x.every((v, k) => k == 0 || x[k - 1] <= v)};
 }
 
-// The index of the sample of a sorted array that is nearest to the value.
-function nearest(sorted, value) {
+// The index of the sample of a sorted array below a value, and of the nearest one.
+function below(sorted, value) {
   let low = 0, high = sorted.length - 1;
   while (high - low > 1) {
     const middle = (low + high) >> 1;
     sorted[middle] <= value ? low = middle : high = middle;
   }
-  return Math.abs(sorted[high] - value) < Math.abs(sorted[low] - value) ? high : low;
+  return low;
+}
+function nearest(sorted, value) {
+  const low = below(sorted, value);
+  return Math.abs(sorted[low + 1] - value) < Math.abs(sorted[low] - value) ? low + 1 : low;
 }
 
 class Plot {
@@ -63,9 +67,9 @@ class Plot {
       ({...this.plot.series[k], ...samples(path), on: true}));
     this.moving = [...this.svg.querySelectorAll("[data-at]")].map(e =>
       ({e, home: [...e.dataset.at].map(axis => [axis, parseFloat(e.getAttribute(axis)) / 100])}));
-    this.line = this.make("line", {class: "cursor", y2: "100%"});
-    this.box = this.make("rect", {class: "zoom"});
-    this.catcher = this.make("rect", {class: "catch", width: "100%", height: "100%"});
+    this.line = svg("line", {class: "cursor", y2: "100%"});
+    this.box = svg("rect", {class: "zoom"});
+    this.catcher = svg("rect", {class: "catch", width: "100%", height: "100%"});
     this.svg.append(this.line, this.box, this.catcher);
     this.readout = element("div", {class: "readout", "aria-live": "off"});
     figure.append(this.readout);
@@ -74,8 +78,6 @@ class Plot {
     if (this.over_time) cursor.listeners.push(() => this.show_cursor());
     new ResizeObserver(() => this.draw()).observe(figure);
   }
-
-  make(tag, attributes = {}, children = []) { return element(tag, attributes, children, this.svg.namespaceURI); }
 
   // Fractions of the drawing to places in the frame, and to values; logarithmic axes hold logarithms.
   place(axis, v) { const [a, b] = this.view[axis]; return 100 * (v - a) / (b - a) + "%"; }
@@ -192,7 +194,7 @@ class Plot {
     const near_one = values.every(v => v > 0.9e-3 && v < 1.1e4);
     const power = v => {
       const exponent = Math.floor(Math.log10(v) + 1e-9), digits = v / 10 ** exponent;
-      const raised = this.make("tspan", {dy: -4, "font-size": 9}, [String(exponent)]);
+      const raised = svg("tspan", {dy: -4, "font-size": 9}, [String(exponent)]);
       return [(Math.abs(digits - 1) < 1e-6 ? "" : shown(digits, 4) + "\u00b7") + "10", raised];
     };
     return values.map(v => [Math.log10(v), near_one ? [shown(v)] : power(v)]);
@@ -200,7 +202,7 @@ class Plot {
 
   draw_ticks(width) {
     this.ticks.replaceChildren();
-    const add = (line, place, words) => this.ticks.append(this.make("line", line), this.make("text", place, words));
+    const add = (line, place, words) => this.ticks.append(svg("line", line), svg("text", place, words));
     const names = this.plot.names.map((name, k) => [k, [name]]);
     for (const [v, words] of names.length ? names : this.labelled("x", Math.min(Math.max(width / 75, 2), 8))) {
       const share = this.from_axis("x", v), x = this.place("x", share);

@@ -1,4 +1,4 @@
-// Vectors, rotations and hulls of points.
+// Vectors, rotations, and paths through points of the drawing.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -24,4 +24,15 @@ function hull_of(points) {
     hull.pop();
   }
   return hull.length ? hull : sorted.slice(0, 1);
+}
+
+// The d of SVG paths: through points; a cross; an arrow along v, if it is long enough.
+const path_of = (points, end = "") => "M" + points.map(p => p[0].toFixed(1) + " " + p[1].toFixed(1)).join("L") + end;
+const cross_at = ([x, y], r) => path_of([[x - r, y - r], [x + r, y + r]]) + path_of([[x - r, y + r], [x + r, y - r]]);
+function arrow(from, v) {
+  const n = Math.hypot(...v);
+  if (!(n >= 5 && isFinite(n))) return "";
+  const to = [from[0] + v[0], from[1] + v[1]], [x, y] = [6 * v[0] / n, 6 * v[1] / n];
+  const barb = side => [to[0] - x - side * y / 2, to[1] - y + side * x / 2];
+  return path_of([from, to]) + path_of([barb(1), to, barb(-1)]);
 }

@@ -1,23 +1,23 @@
-// The mechanism that moves: its controls, the view, the order in which parts are drawn.
+// The mechanism that moves: its controls, the view, what is drawn at an instant. Its elements have the classes of the
+// still drawing (mechanism_drawing.cpp).
 
 const kArrow = 80;  // length of a large force [px]
 
-class Viewer extends Symbols {
+class Viewer {
   constructor(box, motion) {
-    super();
     this.motion = motion, this.states = motion.states.map(s => new State(s));
     const times = this.states.flatMap(s => [s.t[0], s.t.at(-1)]);
     this.begin = Math.min(...times), this.end = Math.max(...times), this.t = this.begin;
     this.playing = false, this.hidden = new Set();
-    this.canvas = element("canvas", {tabindex: "0", role: "img", "aria-label":
+    this.svg = svg("svg", {tabindex: "0", role: "img", "aria-label":
       "The mechanism. Space plays, left and right arrows step, up and down arrows turn, plus and minus zoom, 0 fits."});
-    box.append(this.canvas, ...this.controls());
+    box.append(this.svg, ...this.controls());
     if (motion.note) box.append(element("p", {class: "note"}, [motion.note]));
     this.bounds();
+    this.parts = this.states.flatMap(s => this.parts_of(s)), this.frame = this.svg.appendChild(svg("g"));
     this.view(motion.planar ? "flat" : "iso");
     this.listen();
-    new ResizeObserver(() => this.draw()).observe(this.canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    new ResizeObserver(() => this.draw()).observe(this.svg);
     cursor.listeners.push(t => { this.t = Math.min(Math.max(t, this.begin), this.end); this.draw(); });
   }
 
@@ -81,13 +81,8 @@ class Viewer extends Symbols {
     for (const s of this.states) {
       for (let k = 0; k <= 40; ++k) {
         const poses = s.poses(this.begin + (this.end - this.begin) * k / 40);
-        s.bodies.forEach((b, i) => b.points.forEach(p => include(s.at(poses, i, p))));
-        s.bodies.forEach((b, i) => b.shapes.forEach(shape => {
-          for (const end of [shape.from, shape.to])
-            for (const r of [-shape.radius, shape.radius]) include(s.at(poses, i, end).map(v => v + r));
-        }));
-        for (const j of [...s.joints, ...s.springs])
-          include(s.at(poses, j.b1, j.p1)), include(s.at(poses, j.b2, j.p2));
+        s.bodies.forEach((body, b) => [body.points, ...body.hulls].flat().forEach(p => include(s.at(poses, {b, p}))));
+        for (const {at, to} of s.marks) include(s.at(poses, at)), include(s.at(poses, to || at));
       }
       for (const target of s.targets) {
         target.places = s.places(target);
@@ -131,10 +126,10 @@ class Viewer extends Symbols {
   listen() {
     const pointers = new Map();
     let spread = null;
-    this.canvas.addEventListener("pointerdown", e => {
-      pointers.set(e.pointerId, [e.clientX, e.clientY]), this.canvas.setPointerCapture(e.pointerId), spread = null;
+    this.svg.addEventListener("pointerdown", e => {
+      pointers.set(e.pointerId, [e.clientX, e.clientY]), this.svg.setPointerCapture(e.pointerId), spread = null;
     });
-    this.canvas.addEventListener("pointermove", e => {
+    this.svg.addEventListener("pointermove", e => {
       const before = pointers.get(e.pointerId);
       if (!before) return;
       const dx = e.clientX - before[0], dy = e.clientY - before[1];
@@ -152,11 +147,11 @@ class Viewer extends Symbols {
       }
     });
     for (const end of ["pointerup", "pointercancel"])
-      this.canvas.addEventListener(end, e => { pointers.delete(e.pointerId); });
-    this.canvas.addEventListener("contextmenu", e => e.preventDefault());
+      this.svg.addEventListener(end, e => { pointers.delete(e.pointerId); });
+    this.svg.addEventListener("contextmenu", e => e.preventDefault());
     const wheel = e => { e.preventDefault(); this.zoom(Math.exp(-e.deltaY * 0.0015)); };
-    this.canvas.addEventListener("wheel", wheel, {passive: false});
-    this.canvas.onkeydown = e => {
+    this.svg.addEventListener("wheel", wheel, {passive: false});
+    this.svg.onkeydown = e => {
       const step = (this.end - this.begin) / 100, to = t => cursor.set(Math.min(Math.max(t, this.begin), this.end));
       const action = {
         " ": () => this.play(!this.playing), Home: () => to(this.begin), End: () => to(this.end),
@@ -186,88 +181,107 @@ class Viewer extends Symbols {
     requestAnimationFrame(frame);
   }
 
+  // The elements of a state from back to front, each with the attributes that it has at some poses. `key` names what
+  // a reader can hide.
+  parts_of(s) {
+    const parts = [], spot = (poses, point) => this.project(s.at(poses, point));
+    const group = this.svg.appendChild(svg("g", s.ghost ? {class: "earlier"} : {}));
+    const add = (style, attributes, {key = "", d = ""} = {}) => {
+      const e = group.appendChild(svg("path", {class: style, d}));
+      parts.push({s, e, keys: ["ghost " + s.name, key], attributes});
+    };
+    s.traces.forEach((trace, k) => {
+      const at = t => s.at(s.poses(t), trace.at), stride = Math.max(1, Math.floor(s.t.length / 400));
+      const path = s.t.filter((t, i) => i % stride == 0 || i == s.t.length - 1).map(t => [t, at(t)]);
+      const until = t => path_of([...path.filter(p => p[0] <= t).map(p => p[1]), at(t)].map(this.project));
+      const key = "trace " + trace.name, style = "trace c" + (k + 1) % 8;
+      add(style + " ahead", () => ({d: until(this.end)}), {key});
+      add(style, () => ({d: until(this.t)}), {key});
+      add(style + " now", poses => ({d: path_of([spot(poses, trace.at)], "h0")}), {key});
+    });
+    s.bodies.forEach(({hulls, solid}, b) => hulls.forEach(points =>
+      add(`body ${solid ? "solid " : ""}c${b % 8} f${b % 8}`, poses => {
+        const hull = hull_of(points.map(p => spot(poses, {b, p})));
+        return {d: path_of(hull, hull.length > 1 ? "Z" : "h0")};
+      })));
+    // As transform_of in mechanism_drawing.cpp.
+    for (const {style, path, at, to, axis, foreshortened, radius} of s.marks)
+      add("mark " + style, poses => {
+        const [x, y] = spot(poses, at), end = to && spot(poses, to);
+        if (radius) return {transform: `translate(${x} ${y}) scale(${radius * this.scale})`};
+        const along = end ? [end[0] - x, end[1] - y] : axis ? this.flat(s.along(poses, axis)) : [1, 0];
+        const [u, v] = Math.hypot(...along) > 1e-9 ? unit(along) : [1, 0];
+        return {transform: `matrix(${[...(end || foreshortened ? along : [u, v]), -v, u, x, y].join(" ")})`};
+      }, {d: path});
+    for (const {places, t, measured} of s.targets) {  // prescribed places are crosses, measured ones dots
+      const mark = (p, r) => measured ? path_of([p], "h0") : cross_at(p, r), key = measured ? "measured" : "targets";
+      add(key, () => ({d: places.map(p => mark(this.project(p), 3.5)).join("")}), {key});
+      add(key + " now", () => ({d: mark(this.project(places[nearest(t, this.t)]), 6)}), {key});
+    }
+    // The force on the second body of each joint; one that is much larger than most is cut at twice their length.
+    for (const joint of s.reactions ? s.reactions.joints : [])
+      add("limit", poses => {
+        const force = s.reaction(joint, this.t), size = Math.min(Math.hypot(...force) / s.reactions.large, 2);
+        return {d: arrow(spot(poses, joint.at), this.flat(unit(force)).map(x => kArrow * size * x))};
+      }, {key: "reactions"});
+    return parts;
+  }
+
   draw() {
-    const ratio = window.devicePixelRatio || 1, w = this.canvas.clientWidth, h = this.canvas.clientHeight;
+    const {width: w, height: h} = this.svg.getBoundingClientRect();
     if (!w || !this.axes) return;
-    if (this.canvas.width != Math.round(w * ratio)) this.canvas.width = Math.round(w * ratio);
-    if (this.canvas.height != Math.round(h * ratio)) this.canvas.height = Math.round(h * ratio);
-    const c = this.c = this.canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
-    this.colour = name => style.getPropertyValue("--" + name);
     if (this.scale === null) {  // the projected box fills most of the frame
       const share = (k, i) => Math.abs(this.axes[k][i]) * (this.high[i] - this.low[i]) / 2;
       const half = k => share(k, 0) + share(k, 1) + share(k, 2);
       this.scale = Math.min((w / 2 - 40) / Math.max(half(0), 1e-9), (h / 2 - 45) / Math.max(half(1), 1e-9));
     }
     this.project = p => {
-      const d = p.map((v, k) => v - this.target[k]);
-      const [right, up, out] = this.axes.map(axis => dot(axis, d));
-      return [w / 2 + this.pan[0] + this.scale * right, h / 2 + this.pan[1] - this.scale * up, out];
+      const [right, up] = this.flat(p.map((v, k) => v - this.target[k]));
+      return [w / 2 + this.pan[0] + this.scale * right, h / 2 + this.pan[1] + this.scale * up];
     };
-    c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    c.clearRect(0, 0, w, h);
-    c.font = "12px system-ui, sans-serif", c.lineJoin = c.lineCap = "round";
-    for (const s of this.states) if (!this.hidden.has("ghost " + s.name)) this.draw_state(s);
+    const poses = new Map(this.states.map(s => [s, s.poses(this.t)]));
+    for (const {s, e, keys, attributes} of this.parts) {
+      const hidden = keys.some(key => this.hidden.has(key));
+      e.setAttribute("visibility", hidden ? "hidden" : "inherit");
+      if (!hidden) set(e, attributes(poses.get(s)));
+    }
+    this.frame.replaceChildren();
     this.draw_frame(w, h);
+    for (const [s, at] of poses) if (this.names && !s.ghost) this.draw_names(s, at);
     this.clock.textContent = "t = " + this.t.toPrecision(4) + " s";
     if (document.activeElement != this.slider)
       this.slider.value = 1000 * (this.t - this.begin) / (this.end - this.begin || 1);
   }
 
-  draw_state(s) {
-    const c = this.c, poses = s.poses(this.t), spot = (b, p) => this.project(s.at(poses, b, p));
-    c.globalAlpha = s.ghost ? 0.35 : 1;
-    c.setLineDash(s.ghost ? [6, 4] : []);
-    s.traces.forEach((trace, k) => { if (!this.hidden.has("trace " + trace.name)) this.draw_trace(s, trace, k); });
-    for (const spring of s.springs) this.draw_spring(spot(spring.b1, spring.p1), spot(spring.b2, spring.p2), spring);
-    const bodies = s.bodies.map((body, i) => ({body, i, points: body.points.map(p => spot(i, p))}));
-    const depth = b => b.points.reduce((sum, p) => sum + p[2], 0) / (b.points.length || 1);
-    bodies.sort((a, b) => depth(a) - depth(b));  // what is nearer is drawn later
-    for (const {body, i, points} of bodies) {
-      c.strokeStyle = c.fillStyle = this.colour("c" + i % 8);
-      if (!body.shapes.length) this.draw_hull(hull_of(points));
-      for (const shape of body.shapes) this.draw_shape(shape, spot(i, shape.from), spot(i, shape.to));
-    }
-    c.setLineDash([]);
-    for (const joint of s.joints) this.draw_joint(s, poses, joint);
-    for (const target of s.targets)
-      if (!this.hidden.has(target.measured ? "measured" : "targets"))
-        this.draw_target(target.places, nearest(target.t, this.t), target.measured);
-    if (s.reactions && !this.hidden.has("reactions")) this.draw_reactions(s, spot);
-    if (this.names && !s.ghost) {
-      c.fillStyle = this.colour("ink"), c.strokeStyle = this.colour("panel"), c.lineWidth = 4;  // a halo over bars
-      const taken = [];
-      for (const {body, points} of bodies) {
-        const middle = k => points.reduce((sum, p) => sum + p[k], 0) / (points.length || 1);
-        if (!points.length) continue;
-        let x = middle(0) + 7, y = middle(1) - 7;
-        const wide = c.measureText(body.name).width;  // a name that would lie on another one moves up
-        while (taken.some(n => Math.abs(n.y - y) < 13 && x < n.x + n.wide && n.x < x + wide)) y -= 13;
-        taken.push({x, y, wide});
-        c.strokeText(body.name, x, y), c.fillText(body.name, x, y);
-      }
-    }
-    c.globalAlpha = 1;
+  // A direction of space in the drawing, where y points down.
+  flat(v) { return [dot(this.axes[0], v), -dot(this.axes[1], v)]; }
+
+  draw_names(s, poses) {
+    const taken = [];
+    s.bodies.forEach((body, b) => {
+      const points = body.points.map(p => this.project(s.at(poses, {b, p})));
+      const middle = k => points.reduce((sum, p) => sum + p[k], 0) / (points.length || 1);
+      let [x, y] = [middle(0) + 7, middle(1) - 7];
+      const text = this.frame.appendChild(svg("text", {}, [body.name])), wide = text.getComputedTextLength();
+      while (taken.some(n => Math.abs(n.y - y) < 13 && x < n.x + n.wide && n.x < x + wide)) y -= 13;  // moves up
+      taken.push({x, y, wide});
+      set(text, {x, y});
+    });
   }
 
-  // The force on the second body of each joint; one that is much larger than most is cut at twice their length.
-  draw_reactions(s, spot) {
-    for (const joint of s.reactions.joints) {
-      const force = s.reaction(joint, this.t), size = Math.hypot(...force) / s.reactions.large;
-      const v = this.flat(unit(force)).map(x => kArrow * Math.min(size, 2) * x);
-      if (v.every(isFinite)) this.draw_arrow(spot(joint.b, joint.p), v, "limit");
-    }
-  }
-
-  draw_trace(s, trace, k) {
-    const c = this.c, alpha = c.globalAlpha, path = [], past = [];
-    const stride = Math.max(1, Math.floor(s.t.length / 400));
-    const times = s.t.filter((t, i) => i % stride == 0 || i == s.t.length - 1);
-    trace.path = trace.path || times.map(t => [t, s.at(s.poses(t), trace.b, trace.p)]);
-    for (const [t, p] of trace.path) path.push(this.project(p)), t <= this.t && past.push(path.at(-1));
-    c.strokeStyle = this.colour("c" + (k + 1) % 8), c.lineWidth = 1;
-    c.globalAlpha = alpha * 0.4, this.stroke(path), c.globalAlpha = alpha, c.lineWidth = 1.8;
-    past.push(this.project(s.at(s.poses(this.t), trace.b, trace.p)));
-    this.stroke(past);
-    c.fillStyle = c.strokeStyle, c.beginPath(), c.arc(past.at(-1)[0], past.at(-1)[1], 3, 0, 7), c.fill();
+  // Axes, gravity and a round length, in the corners.
+  draw_frame(w, h) {
+    const add = (style, d, x, y, words) =>
+      this.frame.append(svg("path", {class: style, d}), svg("text", {x, y}, d ? [words] : []));
+    const label = (from, v, style, name) => {
+      const [x, y] = unit(v);
+      add("line " + style, arrow(from, v), from[0] + v[0] + 7 * x - 3, from[1] + v[1] + 10 * y + 4, name);
+    };
+    ["c1", "c2", "c0"].forEach((style, k) =>
+      label([42, h - 42], [26 * this.axes[0][k], -26 * this.axes[1][k]], style, "xyz"[k]));
+    if (Math.hypot(...this.motion.gravity) > 0)
+      label([w - 34, 24], this.flat(unit(this.motion.gravity)).map(v => 30 * v), "frame", "g");
+    const length = round_ticks(0, w / 2 / this.scale, 4)[1], left = w - 16 - length * this.scale;
+    add("frame", `M${left} ${h - 18}v6H${w - 16}v-6`, left, h - 22, shown(length) + " m");
   }
 }

@@ -42,13 +42,13 @@ std::vector<double> numbers_of_body(const std::string& svg, std::size_t which = 
 TEST_CASE("the plane of a drawing is the one in which the mechanism moves most", "[report]") {
   const Scene scene = drawn_pendulum();
   Trajectory swing{{}, {bar_at(0), bar_at(0.5), bar_at(1)}};
-  CHECK(plane_of_motion(scene, swing) == std::array{0, 1});
+  CHECK(plane_of_motion(scene, swing).axes == std::array{0, 1});
   // About y instead: in x and z.
   for (auto& row : swing.rows) std::swap(row[6], row[7]), std::swap(row[5], row[6]), std::swap(row[5], row[7]);
   for (auto& row : swing.rows) row[6] = std::sqrt(1 - row[4] * row[4]), row[5] = row[7] = 0;
-  CHECK(plane_of_motion(scene, swing) == std::array{0, 2});
+  CHECK(plane_of_motion(scene, swing).axes == std::array{0, 2});
   // Nothing moves: where it is spread most.
-  CHECK(plane_of_motion(scene, {{}, {bar_at(1.2), bar_at(1.2)}}) == std::array{0, 1});
+  CHECK(plane_of_motion(scene, {{}, {bar_at(1.2), bar_at(1.2)}}).axes == std::array{0, 1});
   CHECK_NOTHROW(plane_of_motion(scene, {}));
 }
 
@@ -78,9 +78,9 @@ TEST_CASE("springs and bodies of three points are drawn, directions are no point
   scene.forces.push_back({"s", spring});
   const std::vector<double> row = bar_at(0);
   const std::string svg = mechanism_drawing("one", {0, 1}, {{"start", scene, row}});
-  CHECK(svg.find("class=\"spring\"") != std::string::npos);
+  CHECK(svg.find("class=\"mark spring\"") != std::string::npos);
   CHECK(numbers_of_body(svg).size() == 6);
-  CHECK(plane_of_motion(scene, {{}, {row, row}}) == std::array{0, 1});  // 50 m along z are no part of it
+  CHECK(plane_of_motion(scene, {{}, {row, row}}).axes == std::array{0, 1});  // 50 m along z are no part of it
   CHECK(mechanism_drawing("none", {0, 1}, {}).empty());
 }
 

@@ -18,23 +18,26 @@ std::vector<double> bar_turned(double t, double angle) {
   return {t, 0, 0, 0, std::cos(angle / 2), 0, 0, std::sin(angle / 2), 0, 0, 0, 0, 0, 1};
 }
 
+constexpr MotionPlane kPlane{{0, 1}, true};
+
 }  // namespace
 
 TEST_CASE("a motion holds what moves as arrays and what rests as numbers", "[report]") {
   const Scene scene = pendulum();
   const Trajectory swing{{}, {bar_turned(0, 0), bar_turned(0.5, 0.2), bar_turned(1, 0.4)}};
-  PageArrays arrays;
-  const auto motion = nlohmann::json::parse(motion_scene(arrays, {0, 1}, {{"bar", scene, swing}}));
-  const auto all = nlohmann::json::parse(arrays.text());
+  const Json motion = motion_scene(kPlane, {{"bar", scene, swing}});
   CHECK(motion.at("planar") == true);
   const auto& state = motion.at("states")[0];
-  CHECK(all[state.at("t").get<std::size_t>()] == nlohmann::json({0, 0.5, 1}));
-  const auto& row = state.at("bodies")[0].at("row");
-  CHECK(row[0] == 0);
-  REQUIRE(row[6].is_array());
-  CHECK(all[row[6][0].get<std::size_t>()][2].get<double>() == Approx(std::sin(0.2)).epsilon(1e-5));
-  CHECK(state.at("joints").size() == 1);
-  CHECK(state.at("joints")[0].at("b1") == -1);
+  CHECK(state.at("t") == Json({0, 0.5, 1}));
+  const auto& pose = state.at("bodies")[0].at("pose");
+  CHECK(pose[0] == 0);
+  REQUIRE(pose[6].is_array());
+  CHECK(pose[6][2].get<double>() == Approx(std::sin(0.2)).epsilon(1e-5));
+  REQUIRE(state.at("marks").size() == 3);  // the ground, a line along the axis, the joint
+  CHECK(state.at("marks")[0].at("style") == "ground");
+  CHECK(state.at("marks")[0].at("at").at("b") == -1);
+  CHECK(state.at("marks")[1].at("foreshortened") == true);
+  CHECK(state.at("marks")[2].at("at").at("b") == 0);
 }
 
 TEST_CASE("a motion holds what its points should follow and the forces of its joints", "[report]") {
@@ -51,40 +54,34 @@ TEST_CASE("a motion holds what its points should follow and the forces of its jo
   const Trajectory swing{{}, {bar_turned(0, 0), bar_turned(1, 0.4)}};
   const std::string joint = scene.joints[0].name;
   const Trajectory forces{{"t", joint + ".x", joint + ".y", joint + ".z"}, {{0, 3, 4, 0}, {1, 0, 1, 0}}};
-  PageArrays arrays;
-  const auto motion =
-      nlohmann::json::parse(motion_scene(arrays, {0, 1}, {{"bar", scene, swing, false, targets, forces}}));
-  const auto all = nlohmann::json::parse(arrays.text());
+  const Json motion = motion_scene(kPlane, {{"bar", scene, swing, false, targets, forces}});
   const auto& state = motion.at("states")[0];
   const auto& target = state.at("targets")[0];
-  CHECK(target.at("b") == 0);
-  CHECK(all[target.at("place")[0].get<std::size_t>()] == nlohmann::json({1, 2}));
-  CHECK(all[target.at("place")[1].get<std::size_t>()] == nlohmann::json({3, 4}));
+  CHECK(target.at("at").at("b") == 0);
+  CHECK(target.at("place")[0] == Json({1, 2}));
+  CHECK(target.at("place")[1] == Json({3, 4}));
   CHECK(target.at("place")[2].is_null());
   CHECK(state.at("reactions").at("large") == 5);
-  CHECK(all[state.at("reactions").at("joints")[0].at("force")[1].get<std::size_t>()] == nlohmann::json({4, 1}));
+  CHECK(state.at("reactions").at("joints")[0].at("force")[1] == Json({4, 1}));
 }
 
 TEST_CASE("a motion out of its plane is not planar, one without two rows or with infinite poses is none", "[report]") {
   const Scene scene = pendulum();
-  PageArrays arrays;
   Trajectory swing{{}, {bar_turned(0, 0), bar_turned(1, 0.4)}};
   swing.rows[1][3] = 0.1;
-  CHECK(nlohmann::json::parse(motion_scene(arrays, {0, 1}, {{"bar", scene, swing}})).at("planar") == false);
+  CHECK_FALSE(plane_of_motion(scene, swing).holds_all);
   swing.rows[1][3] = std::numeric_limits<double>::infinity();
-  CHECK(motion_scene(arrays, {0, 1}, {{"bar", scene, swing}}).empty());
+  CHECK(motion_scene(kPlane, {{"bar", scene, swing}}).is_null());
   swing.rows.pop_back();
-  CHECK(motion_scene(arrays, {0, 1}, {{"bar", scene, swing}}).empty());
+  CHECK(motion_scene(kPlane, {{"bar", scene, swing}}).is_null());
 }
 
 TEST_CASE("a long motion is thinned, keeps its end, and says so", "[report]") {
   const Scene scene = pendulum();
   Trajectory swing;
   for (int k = 0; k <= 100'000; ++k) swing.rows.push_back(bar_turned(k, k * 1e-4));
-  PageArrays arrays;
-  const std::string text = motion_scene(arrays, {0, 1}, {{"bar", scene, swing}});
-  const auto motion = nlohmann::json::parse(text);
-  const auto t = nlohmann::json::parse(arrays.text())[motion.at("states")[0].at("t").get<std::size_t>()];
+  const Json motion = motion_scene(kPlane, {{"bar", scene, swing}});
+  const Json& t = motion.at("states")[0].at("t");
   CHECK(t.size() < 3000);
   CHECK(t.back() == 100'000);
   CHECK(motion.at("note") == "The motion shows every 36th of 100001 rows of trajectory.csv.");
