@@ -88,7 +88,6 @@ class RungeKuttaRun::Loop {
   void note_step(std::span<const StepObserver> observers);
   void choose_next_size();
   void advance();
-  void restart();
   void add_statistics();
   std::string tolerances_or(std::string message) const;
   double step_to(double event) const;
@@ -167,9 +166,8 @@ double RungeKuttaRun::Loop::step_to(double event) const {
 
 double RungeKuttaRun::Loop::fastest_tracked_rate() const {
   double fastest = 0;
-  const Eigen::VectorXd& y = step_.y0;
   for (const JointAngle& a : mechanism_.data().angles) {
-    fastest = std::max(fastest, std::abs(a.rate(body_at(y, a.body1).frame, body_at(y, a.body2).frame)));
+    fastest = std::max(fastest, std::abs(a.rate(body_at(step_.y0, a.body1).frame, body_at(step_.y0, a.body2).frame)));
   }
   return fastest;
 }
@@ -423,26 +421,20 @@ void RungeKuttaRun::Loop::advance() {
   const bool event = !options_.frozen && events_.reached(step_.t1);
   const bool kink = !options_.frozen && !event && step_.t1 < end_ && kink_control_.reached(step_.t1);
   attempt_.advance(event ? events_.resume_time() : kink ? kink_control_.resume_time() : step_.t1);
-  if (event) restart();
-  if (kink) attempt_.restart();
+  if (event && adaptive_) {  // the steps before say nothing about those after it
+    const IntegratorSettings& s = settings_.integrator;
+    controller_ = StepController(rk_.error_order, s.options);
+    h_ = std::clamp(attempt_.first_step(s, end_ - step_.t), s.options.min_step.value_or(0),
+                    s.max_step.value_or(INFINITY));
+    if (attempt_.passage()) attempt_.passage()->forget();
+  }
+  if (event || kink) attempt_.restart();
   result_.last_good_time = step_.t;
   ++frozen_index_;
   if (options_.after_step) options_.after_step({step_.t, step_.y0, step_.angles0});
   if (options_.progress && !options_.progress(step_.t)) {
     stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", step_.t));
   }
-}
-
-// The steps before an event say nothing about those after it.
-void RungeKuttaRun::Loop::restart() {
-  const IntegratorSettings& s = settings_.integrator;
-  if (adaptive_) {
-    const double left = end_ - step_.t;
-    controller_ = StepController(rk_.error_order, s.options);
-    h_ = std::clamp(attempt_.first_step(s, left), s.options.min_step.value_or(0), s.max_step.value_or(INFINITY));
-    if (attempt_.passage()) attempt_.passage()->forget();
-  }
-  attempt_.restart();
 }
 
 void RungeKuttaRun::Loop::add_statistics() {

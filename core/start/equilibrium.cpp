@@ -145,39 +145,37 @@ class Statics {
   // The parts, 0 to 1, of the way from q to q + change between which laws of forces have no pulse, step or kink, as far
   // as what they read changes evenly.
   std::vector<double> places_of_laws(const VectorXd& q, const VectorXd& change) {
-    const std::size_t P = static_cast<std::size_t>(d_.rho.size());
     const VectorXd ends[2] = {at_rest_in(q), at_rest_in(q + change)};
     std::vector<double> places, inputs[2];
-    const auto add = [&](const Program& law) {
+    const auto add = [&](const Program& law, auto&& append_motion) {
+      for (const int end : {0, 1}) {
+        inputs[end].assign(d_.rho.begin(), d_.rho.end());
+        append_motion(ends[end], inputs[end]);
+      }
       if (inputs[0] == inputs[1]) return;
       const std::vector<double> pieces = pieces_between(law, inputs[0], inputs[1]);
       places.insert(places.end(), pieces.begin(), pieces.end());
     };
     d_.forces->for_each([&]<class Kind>(const Kind& f, ForcePlace) {
       if constexpr (HasLaw<Kind>) {
-        if (!f.law.program) return;
-        const auto [i, j] = f.bodies();
-        for (const int end : {0, 1}) {
-          const auto [x, xdot] = f.measured(angles_, body_at(ends[end], i).frame, body_at(ends[end], j).frame);
-          inputs[end].assign(d_.rho.begin(), d_.rho.end());
-          inputs[end].insert(inputs[end].end(), {x, 0.0, t_});
-        }
-        add(*f.law.program);
+        if (f.law.program)
+          add(*f.law.program, [&](const VectorXd& y, std::vector<double>& of_law) {
+            const auto [i, j] = f.bodies();
+            const auto [x, xdot] = f.measured(angles_, body_at(y, i).frame, body_at(y, j).frame);
+            of_law.insert(of_law.end(), {x, 0.0, t_});
+          });
       }
     });
-    for (const AppliedForce& f : d_.applied) {
-      for (const Program& component : f.components) {
-        for (const int end : {0, 1}) {
-          inputs[end].assign(d_.rho.begin(), d_.rho.end());
-          inputs[end].resize(P + 1 + static_cast<std::size_t>(mechanism_.sensors()), t_);
+    for (const AppliedForce& f : d_.applied)
+      for (const Program& component : f.components)
+        add(component, [&](const VectorXd& y, std::vector<double>& of_law) {
+          const int first = static_cast<int>(of_law.size()) + 1;  // sensor
+          of_law.resize(of_law.size() + 1 + static_cast<std::size_t>(mechanism_.sensors()), t_);
           for (const int input : component.used_inputs())
-            if (const int sensor = input - static_cast<int>(P) - 1; sensor >= 0)
-              inputs[end][static_cast<std::size_t>(input)] =
-                  mechanism_.sensor_value(sensor, {t_, ends[end], angles_, nullptr});
-        }
-        add(component);
-      }
-    }
+            if (input >= first)
+              of_law[static_cast<std::size_t>(input)] =
+                  mechanism_.sensor_value(input - first, {t_, y, angles_, nullptr});
+        });
     return places;
   }
 
