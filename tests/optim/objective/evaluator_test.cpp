@@ -194,6 +194,9 @@ TEST_CASE("a peak that a solved run passes over is said", "[gradient]") {
   const std::vector<std::string> narrow = said(1e-3);
   REQUIRE(narrow.size() == 1);
   CHECK_THAT(narrow[0], Contains("'peak'") && Contains("the true extreme is 1") && Contains("max_step"));
+  Evaluator evaluator(scene, {Objective(scene, peak)});
+  for (const std::string& warning : evaluator.gradients(evaluator.start()).warnings)
+    CHECK_THAT(warning, !Contains("jumps"));
 }
 
 TEST_CASE("the derivative of a root through zero is watched, though the root itself is resolved", "[gradient]") {
