@@ -114,12 +114,12 @@ std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& 
       text = with_override(text, fmt::format("{}.overrides.{}={}", place, v.parameter, v.value));
     }
   }
-  // File names are relative to the folder of the text.
+  // File names are relative to the folder of the text, which may have been removed.
+  const auto folder = std::filesystem::weakly_canonical(std::filesystem::absolute(run.folder.path()));
   for (const NamedFiles& named : named_files(problem)) {
     Json moved = Json::array();
     for (const std::string& file : named.files)
-      moved.push_back(
-          std::filesystem::relative(file, std::filesystem::weakly_canonical(run.folder.path())).generic_string());
+      moved.push_back(std::filesystem::relative(file, folder).generic_string());
     text = with_value(text, named.path, json_text(named.is_list ? moved : moved[0]));
   }
   for (std::size_t i = 0; i < poses.size(); ++i) {

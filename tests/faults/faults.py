@@ -194,11 +194,11 @@ def content(folder):
     return files
 
 
-def difference(folder, reference, measured):
-    """In words what an output folder has other than the reference; empty: nothing."""
+def difference(folder, reference, measured, but_for=()):
+    """In words what an output folder has other than the reference, but for these files; empty: nothing."""
     if not folder.is_dir():
         return "there is no output folder"
-    here = content(folder)
+    here, reference = ({k: v for k, v in files.items() if k not in but_for} for files in (content(folder), reference))
     if measured:
         return "" if here.keys() == reference.keys() else f"other files: {sorted(here)}"
     if here.keys() != reference.keys():
@@ -285,7 +285,7 @@ class Campaign:
             return "a finished start is lost"
         return difference(out, self.reference[name], name in MEASURED)
 
-    def trial(self, what, name, attempt, codes=(0, 1, 2), ended_by_itself=True):
+    def trial(self, what, name, attempt, codes=(0, 1, 2), ended_by_itself=True, but_for=()):
         """attempt(folder) runs the command under a fault."""
         folder = self.site.folder()
         ended = attempt(folder)
@@ -293,7 +293,7 @@ class Campaign:
         if not complaint and ended_by_itself and status(folder / "out") == "running":
             complaint = f"exit code {ended.code}, but the status stays 'running': {ended.err[-300:]}"
         if not complaint and ended.code == 0:
-            complaint = difference(folder / "out", self.reference[name], name in MEASURED)
+            complaint = difference(folder / "out", self.reference[name], name in MEASURED, but_for)
         complaint = complaint or self.heal(name, folder)
         self.trials.add(f"{what}, {name}", complaint)
         if complaint and self.a.keep:
@@ -392,7 +392,9 @@ class Campaign:
             for name in self.some(list(ALL), 2):
                 self.trial("read-only folder", name, lambda folder: self.read_only(name, folder, limited), codes=(1, 2))
         for name in self.some(list(LONG), 1):
-            self.trial("vanishing folder", name, lambda folder: self.vanishing(name, folder))
+            # The outcome is written to a new folder, with a warning. A journal goes with the old one.
+            self.trial("vanishing folder", name, lambda folder: self.vanishing(name, folder),
+                       but_for=["journal.jsonl", "result.json", "report.html"])
             self.trial("folder that another run holds", name, lambda folder: self.taken(name, folder))
 
     def as_nobody(self, name, folder, apply):
