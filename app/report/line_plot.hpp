@@ -57,7 +57,7 @@ inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of
 
 std::string to_svg(const LinePlot& plot);
 
-// What the drawing alone does not tell the page's script: ranges of the axes, names of the series; as JSON.
+// Returns what the page's script does not read from the drawing: ranges of the axes, names of the series; as JSON.
 std::string plot_data(const LinePlot& plot);
 
 // About `count` round numbers (1, 2 or 5 times a power of ten) that cover [low, high].

@@ -1,5 +1,5 @@
-// What drawings of a mechanism show: hulls of its bodies, marks (joints, springs, dampers, the ground) at points,
-// points whose paths are drawn. mechanism_drawing.hpp draws it at some instants, script/viewer.js moves it.
+// Drawings of a mechanism show hulls of its bodies, marks (joints, springs, dampers, the ground) at points,
+// and points whose paths are drawn. mechanism_drawing.hpp draws it at some instants, script/viewer.js moves it.
 #pragma once
 
 #include <Eigen/Core>
