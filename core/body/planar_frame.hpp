@@ -7,7 +7,7 @@
 
 namespace mbsopt {
 
-// A body's motion as primitives see it; T = LaneDual: with its tangent.
+// A body's motion as primitives see it; T = Dual: with its tangent.
 template <class T>
 struct PlanarFrame {
   Complex<T> r, rdot, A{1, 0}, Adot, Addot;

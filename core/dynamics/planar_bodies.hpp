@@ -22,12 +22,12 @@ class PlanarBodies {
     return {b.p_a.dot(y.template segment<4>(first)), b.p_b.dot(y.template segment<4>(first))};
   }
   PlaneDual vector(const Plane& x, const LaneRows& y_dir, Eigen::Index first) const {
-    return {{x.re, y_dir.row(first + model_->t1).array()}, {x.im, y_dir.row(first + model_->t2).array()}};
+    return {dual(x.re, y_dir.row(first + model_->t1)), dual(x.im, y_dir.row(first + model_->t2))};
   }
   PlaneDual turn(std::size_t body, const Plane& P, const LaneRows& y_dir, Eigen::Index first) const {
     const PlanarBody& b = model_->bodies[body];
     const Lanes<4> p_dir = y_dir.middleRows<4>(first);
-    return {{P.re, LaneDual::Lane(b.p_a.transpose() * p_dir)}, {P.im, LaneDual::Lane(b.p_b.transpose() * p_dir)}};
+    return {dual(P.re, b.p_a.transpose() * p_dir), dual(P.im, b.p_b.transpose() * p_dir)};
   }
 
   template <class Y>
@@ -44,7 +44,7 @@ class PlanarBodies {
   }
   void add_turn_direction(std::size_t body, const PlaneDual& P, Eigen::Index first, LaneRows& y_dir) const {
     const PlanarBody& b = model_->bodies[body];
-    y_dir.middleRows<4>(first) += b.p_a * P.re.d.matrix() + b.p_b * P.im.d.matrix();
+    y_dir.middleRows<4>(first) += b.p_a * lanes(P.re) + b.p_b * lanes(P.im);
   }
 
   // Reduces a load (force in global axes, moment in body axes) to the plane, and returns it to space.

@@ -125,7 +125,7 @@ Vectors<double> vectors(const PlanarConstraint& c) { return {c.s1, c.s2, c.s3}; 
 // A vector with the directions of its slot; only directions in the plane count.
 PlaneDual moving(const PlanarBody& body, const Plane& s, const Lanes<3>* ds) {
   if (!ds) return {s.re, s.im};
-  return {{s.re, LaneDual::Lane(body.b1.transpose() * *ds)}, {s.im, LaneDual::Lane(body.b2.transpose() * *ds)}};
+  return {dual(s.re, body.b1.transpose() * *ds), dual(s.im, body.b2.transpose() * *ds)};
 }
 
 // Two rows += sign Z s', s' the direction of a slot's vector.
@@ -295,29 +295,29 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
   for (const PlanarConstraint& c : model_->constraints) {
     if (c.kind == Kind::point && order == Order::phi_ddot) continue;
     const std::size_t i = at(c.body1), j = at(c.body2);
-    const PlanarFrame<LaneDual>&f1 = frames[i], &f2 = frames[j];
-    const auto add_load = [&](std::size_t body, const PlaneDual& force, const LaneDual& moment) {
-      loads[body].row(0) += force.re.d.matrix();
-      loads[body].row(1) += force.im.d.matrix();
-      loads[body].row(2) += moment.d.matrix();
+    const PlanarFrame<Dual>&f1 = frames[i], &f2 = frames[j];
+    const auto add_load = [&](std::size_t body, const PlaneDual& force, const Dual& moment) {
+      loads[body].row(0) += lanes(force.re);
+      loads[body].row(1) += lanes(force.im);
+      loads[body].row(2) += lanes(moment);
     };
     const auto add = [&](const auto& s) {
       if (c.kind == Kind::point) {
         const PlaneDual d = separation(f1, f2, s).of(order);
-        rows.row(c.row) += d.re.d.matrix();
-        rows.row(c.row2) += d.im.d.matrix();
+        rows.row(c.row) += lanes(d.re);
+        rows.row(c.row2) += lanes(d.im);
         const Plane l{lambda(c.row), lambda(c.row2)};
-        loads[i].row(2) -= cross(f1.A * s.s1, l).d.matrix();
-        loads[j].row(2) += cross(f2.A * s.s2, l).d.matrix();
+        loads[i].row(2) -= lanes(cross(f1.A * s.s1, l));
+        loads[j].row(2) += lanes(cross(f2.A * s.s2, l));
         return;
       }
-      LaneDual factor = c.factor;
+      Dual factor = c.factor;
       Lanes<1> storage;
-      if (const Lanes<1>* change = block.field<1>(c.slot_factor, storage)) factor.d = change->array();
-      LaneDual phi = phi_of(order, c, f1, f2, s);
-      if (order == Order::phi) phi.v = on_branch(c, laws, angles, phi.v);
-      rows.row(c.row) += (factor * phi).d.matrix();
-      const LaneDual l = lambda(c.row) * factor;
+      if (const Lanes<1>* change = block.field<1>(c.slot_factor, storage)) factor.derivatives() = change->transpose();
+      Dual phi = phi_of(order, c, f1, f2, s);
+      if (order == Order::phi) phi.value() = on_branch(c, laws, angles, phi.value());
+      rows.row(c.row) += lanes(factor * phi);
+      const Dual l = lambda(c.row) * factor;
       const auto J = column_of(c, f1, f2, s);
       add_load(i, l * J.force1, l * J.moment1);
       add_load(j, l * J.force2, l * J.moment2);
@@ -327,7 +327,7 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
           *s3 = block.field<3>(c.slot3, d3);
     if (s1 || s2 || s3) {
       const PlanarBody &b1 = model_->bodies[i], &b2 = model_->bodies[j];
-      add(Vectors<LaneDual>{moving(b1, c.s1, s1), moving(b2, c.s2, s2), moving(b1, c.s3, s3)});
+      add(Vectors<Dual>{moving(b1, c.s1, s1), moving(b2, c.s2, s2), moving(b1, c.s3, s3)});
     } else {
       add(vectors(c));
     }
@@ -339,7 +339,7 @@ void PlanarConstraints::field_tangents(const Frames& frames, RowLaws& laws, cons
                                        const ParameterBlock& block, LaneRows& phi) const {
   phi.setZero();
   const auto at_rest = [](const PlanarFrame<double>& f) {
-    PlanarFrame<LaneDual> out;
+    PlanarFrame<Dual> out;
     out.r = {f.r.re, f.r.im}, out.A = {f.A.re, f.A.im};
     return out;
   };
@@ -355,14 +355,14 @@ void PlanarConstraints::field_tangents(const Frames& frames, RowLaws& laws, cons
     Lanes<1> d_factor;
     const Lanes<3>*s1 = block.field<3>(c.slot1, d1), *s2 = block.field<3>(c.slot2, d2),
           *s3 = block.field<3>(c.slot3, d3);
-    LaneDual factor = c.factor;
+    Dual factor = c.factor;
     const Lanes<1>* const change = block.field<1>(c.slot_factor, d_factor);
-    if (change) factor.d = change->array();
+    if (change) factor.derivatives() = change->transpose();
     if (!s1 && !s2 && !s3 && !change) continue;
-    const Vectors<LaneDual> s{moving(b1, c.s1, s1), moving(b2, c.s2, s2), moving(b1, c.s3, s3)};
-    LaneDual value = phi_of(Order::phi, c, at_rest(frames[i]), at_rest(frames[j]), s);
-    value.v = on_branch(c, laws, angles, value.v);
-    phi.row(c.row) += (factor * value).d.matrix();
+    const Vectors<Dual> s{moving(b1, c.s1, s1), moving(b2, c.s2, s2), moving(b1, c.s3, s3)};
+    Dual value = phi_of(Order::phi, c, at_rest(frames[i]), at_rest(frames[j]), s);
+    value.value() = on_branch(c, laws, angles, value.value());
+    phi.row(c.row) += lanes(factor * value);
   }
   laws.subtract_tangents(block, {&phi});
 }

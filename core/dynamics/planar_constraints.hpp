@@ -33,7 +33,7 @@ class PlanarConstraints {
 
   enum class Order { phi, phi_dot, phi_ddot };
   using Frames = std::vector<PlanarFrame<double>>;
-  using DualFrames = std::vector<PlanarFrame<LaneDual>>;
+  using DualFrames = std::vector<PlanarFrame<Dual>>;
 
   // Rows that every planar motion satisfies stay zero.
   void phi(const Frames& frames, const RowLaws& laws, const Eigen::VectorXd& angles, Eigen::VectorXd& out) const;

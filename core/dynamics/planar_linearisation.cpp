@@ -148,12 +148,12 @@ void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneR
   const StateLayout layout{data_.n};
   for (const std::size_t k : dual_bodies_) {
     const Body& b = bodies_[k];
-    PlanarFrame<LaneDual>& f = dual_frames_[k];
+    PlanarFrame<Dual>& f = dual_frames_[k];
     f.r = bodies_in_y_.vector(frames_[k].r, y_dir, layout.q(k));
     f.rdot = bodies_in_y_.vector(frames_[k].rdot, y_dir, layout.v(k));
     f.rddot = frames_[k].rddot;
     const auto turn = [&](const Plane& value, Eigen::Index row) {
-      return PlaneDual{{value.re, turn_dirs_[k].row(row).array()}, {value.im, turn_dirs_[k].row(row + 1).array()}};
+      return PlaneDual{dual(value.re, turn_dirs_[k].row(row)), dual(value.im, turn_dirs_[k].row(row + 1))};
     };
     f.set_turn(turn(b.P, 0), turn(b.Pdot, 2), b.omegadot);
   }

@@ -53,7 +53,7 @@ struct InPlane {
   static constexpr int kUnknowns = 3;
   using Frame = PlanarFrame<double>;
   using FrameBar = PlanarFrameBar;
-  using FrameTangent = PlanarFrame<LaneDual>;
+  using FrameTangent = PlanarFrame<Dual>;
   using Constraints = PlanarConstraints;
   using Rows = PlanarRows;
 

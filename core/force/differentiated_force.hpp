@@ -10,8 +10,8 @@
 //
 // load() has the arguments of UserForce::Q. T is double or a dual number, and Q arrives zeroed. Call functions of
 // numbers without std:: (sqrt(x), sin(x)). Branches on values are allowed where the function stays smooth. sqrt and
-// norm have no derivative at 0: add a small number inside. A derivative costs about one load() per 7 coordinates of its
-// bodies (K, C) or 7 parameters (Q_rho), each with 8 numbers in place of one.
+// norm have no derivative at 0: add a small number inside. A derivative costs about one load() per kLanes
+// coordinates of its bodies (K, C) or parameters (Q_rho), each with kLanes + 1 numbers in place of one.
 #pragma once
 
 #include <stdexcept>

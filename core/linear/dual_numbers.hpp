@@ -1,5 +1,5 @@
-// Forward differentiation of functions that are templates in their scalar type. Dual numbers carry the derivatives in
-// seven directions at a time, as many as a body has coordinates (Eigen's AutoDiffScalar).
+// Dual numbers (Eigen's AutoDiffScalar): a number with its derivatives. A function that is a template in its scalar
+// type is its own tangent: it gives the derivatives in kLanes directions if its arguments are Dual.
 //
 //   // J += df/dx
 //   add_jacobian([&](const Eigen::VectorX<Dual>& x, Eigen::VectorX<Dual>& f) { f(0) = sin(x(0)) * x(1); }, x, 1, J);
@@ -9,10 +9,17 @@
 #include <algorithm>
 #include <unsupported/Eigen/AutoDiff>
 
+#include "core/linear/fixed_size.hpp"
+
 namespace mbsopt {
 
-inline constexpr int kDualDirections = 7;
-using Dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, kDualDirections, 1>>;
+template <int Directions>
+using DualNumber = Eigen::AutoDiffScalar<Vec<Directions>>;
+using Dual = DualNumber<kLanes>;
+
+inline Dual dual(double x, const Lanes<1>& directions) { return Dual(x, directions.transpose()); }
+// The derivatives as a row of lanes.
+inline Lanes<1> lanes(const Dual& x) { return x.derivatives().transpose(); }
 
 // Returns constants: the same numbers with derivatives of zero.
 inline Eigen::VectorX<Dual> constants(const Eigen::Ref<const Eigen::VectorXd>& x) { return x.cast<Dual>(); }
@@ -22,14 +29,12 @@ template <class Function>
 void add_jacobian(Function&& f, const Eigen::Ref<const Eigen::VectorXd>& x, double scale,
                   Eigen::Ref<Eigen::MatrixXd> J) {
   Eigen::VectorX<Dual> seeded = constants(x), out(J.rows());
-  for (Eigen::Index first = 0; first < x.size(); first += kDualDirections) {
-    const Eigen::Index count = std::min<Eigen::Index>(kDualDirections, x.size() - first);
-    for (Eigen::Index k = 0; k < count; ++k)
-      seeded(first + k) = Dual(x(first + k), kDualDirections, static_cast<int>(k));
+  for (Eigen::Index first = 0; first < x.size(); first += kLanes) {
+    const Eigen::Index count = std::min<Eigen::Index>(kLanes, x.size() - first);
+    for (Eigen::Index k = 0; k < count; ++k) seeded(first + k) = Dual(x(first + k), kLanes, static_cast<int>(k));
     out.setConstant(Dual(0));
     f(seeded, out);
-    for (Eigen::Index i = 0; i < J.rows(); ++i)
-      J.row(i).segment(first, count) += scale * out(i).derivatives().head(count).transpose();
+    for (Eigen::Index i = 0; i < J.rows(); ++i) J.row(i).segment(first, count) += scale * lanes(out(i)).head(count);
     for (Eigen::Index k = 0; k < count; ++k) seeded(first + k) = Dual(x(first + k));
   }
 }

@@ -38,7 +38,7 @@ std::size_t Compilation::joint_index(const std::string& name, const std::string&
   return found->second;
 }
 
-DualVector3 Compilation::vector(int body, const PointField& field, const std::string& where) const {
+FieldVector3 Compilation::vector(int body, const PointField& field, const std::string& where) const {
   if (const auto* name = std::get_if<std::string>(&field)) {
     if (*name == "O") return {fields.constant(0), fields.constant(0), fields.constant(0)};
     if (body > 0) {
@@ -54,16 +54,16 @@ DualVector3 Compilation::vector(int body, const PointField& field, const std::st
   return fields.values(std::get<VectorField>(field), where);
 }
 
-DualVector3 Compilation::point(int body, const PointField& field, const std::string& where) const {
+FieldVector3 Compilation::point(int body, const PointField& field, const std::string& where) const {
   return vector(body, field, where) - com[static_cast<std::size_t>(body)];
 }
 
-DualVector3 Compilation::direction(int body, const std::optional<PointField>& field, const std::string& where) const {
+FieldVector3 Compilation::direction(int body, const std::optional<PointField>& field, const std::string& where) const {
   if (!field) throw SceneError(where + ": is missing; this joint needs it");
   return unit_axis(vector(body, *field, where), where);
 }
 
-DualVector3 Compilation::unit_axis(const DualVector3& axis, const std::string& where) const {
+FieldVector3 Compilation::unit_axis(const FieldVector3& axis, const std::string& where) const {
   if (numbers(axis).norm() == 0) throw SceneError(where + ": is a zero vector, a direction must not be");
   return unit(axis);
 }

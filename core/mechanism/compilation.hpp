@@ -23,13 +23,13 @@ struct Compilation {
   const Scene& scene;
   FieldValues fields;
   MechanismData data;
-  std::vector<DualVector3> com;          // of each body, the ground first; in the body frame [m]
-  std::vector<DualVector4> orientation;  // of each body in the file, the ground first
-  std::vector<DualVector3> position;     // of its centre of mass, the same [m]
+  std::vector<FieldVector3> com;          // of each body, the ground first; in the body frame [m]
+  std::vector<FieldVector4> orientation;  // of each body in the file, the ground first
+  std::vector<FieldVector3> position;     // of its centre of mass, the same [m]
 
   // Gives the numbers their rows of theta_rho, and returns them.
   template <std::size_t N>
-  const DualVector<N>& keep(int& slot, const DualVector<N>& x) {
+  const FieldVector<N>& keep(int& slot, const FieldVector<N>& x) {
     slot = fields.slot(x);
     return x;
   }
@@ -39,11 +39,11 @@ struct Compilation {
   std::size_t joint_index(const std::string& name, const std::string& where) const;
 
   // A vector in the body's axes, by name or by its components.
-  DualVector3 vector(int body, const PointField& field, const std::string& where) const;
+  FieldVector3 vector(int body, const PointField& field, const std::string& where) const;
   // A point, measured from the centre of mass.
-  DualVector3 point(int body, const PointField& field, const std::string& where) const;
-  DualVector3 direction(int body, const std::optional<PointField>& field, const std::string& where) const;
-  DualVector3 unit_axis(const DualVector3& axis, const std::string& where) const;
+  FieldVector3 point(int body, const PointField& field, const std::string& where) const;
+  FieldVector3 direction(int body, const std::optional<PointField>& field, const std::string& where) const;
+  FieldVector3 unit_axis(const FieldVector3& axis, const std::string& where) const;
 
   enum class Zero { normals, start };
   // The index of a joint's angle among data.angles; the first request creates it.
@@ -54,7 +54,7 @@ struct Compilation {
 
   // A vector of body 1 as body 2 sees it at the orientations in the file, made perpendicular to axis2. It is not finite
   // if the vector lies along axis2.
-  DualVector3 normal_in_file(int body1, const DualVector3& normal1, int body2, const DualVector3& axis2) const;
+  FieldVector3 normal_in_file(int body1, const FieldVector3& normal1, int body2, const FieldVector3& axis2) const;
 
   // Add a constraint on rows of its own, or as a further term of the last row.
   Constraint& add_constraint(Constraint constraint);
@@ -65,7 +65,7 @@ struct Compilation {
   Constraint joint_angle_term(const std::string& joint, Zero zero, const std::string& where);
   JointDisplacement joint_displacement(const std::string& joint, const std::string& where);
   Constraint joint_displacement_term(const std::string& joint, const std::string& where);
-  Dual joint_displacement_in_file(const std::string& joint, const std::string& where) const;
+  FieldValue joint_displacement_in_file(const std::string& joint, const std::string& where) const;
 
  private:
   std::unordered_map<std::string_view, int> bodies_;  // by name, as the next
@@ -74,7 +74,7 @@ struct Compilation {
 };
 
 // The unit Euler parameters of an orientation.
-DualVector4 orientation_of(const Compilation& model, const OrientationField& field, const std::string& where);
+FieldVector4 orientation_of(const Compilation& model, const OrientationField& field, const std::string& where);
 
 void compile_signals(Compilation& model);
 void compile_bodies(Compilation& model);

@@ -5,26 +5,26 @@
 namespace mbsopt {
 namespace {
 
-DualVector3 unit_vector(const Compilation& model, std::size_t k) {
-  DualVector3 e{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
+FieldVector3 unit_vector(const Compilation& model, std::size_t k) {
+  FieldVector3 e{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
   e[k] = model.fields.constant(1);
   return e;
 }
 
 }  // namespace
 
-DualVector4 orientation_of(const Compilation& model, const OrientationField& field, const std::string& where) {
+FieldVector4 orientation_of(const Compilation& model, const OrientationField& field, const std::string& where) {
   if (const auto* e = std::get_if<EulerParametersField>(&field)) {
-    const DualVector4 p = model.fields.values(e->e, where);
+    const FieldVector4 p = model.fields.values(e->e, where);
     if (numbers(p).norm() == 0) throw SceneError(where + ": Euler parameters must not all be zero");
     return unit(p);
   }
   if (const auto* a = std::get_if<AxisAngleField>(&field)) {
-    const DualVector3 axis = model.fields.values(a->axis, where + ".axis");
+    const FieldVector3 axis = model.fields.values(a->axis, where + ".axis");
     return euler_parameters(model.unit_axis(axis, where + ".axis"), model.fields.value(a->angle, where + ".angle"));
   }
-  const DualVector3 rpy = model.fields.values(std::get<RollPitchYawField>(field).rpy, where + ".rpy");
-  DualVector4 p = euler_parameters(unit_vector(model, 2), rpy[2]);
+  const FieldVector3 rpy = model.fields.values(std::get<RollPitchYawField>(field).rpy, where + ".rpy");
+  FieldVector4 p = euler_parameters(unit_vector(model, 2), rpy[2]);
   p = quaternion_product(p, euler_parameters(unit_vector(model, 1), rpy[1]));
   return quaternion_product(p, euler_parameters(unit_vector(model, 0), rpy[0]));
 }
@@ -32,25 +32,25 @@ DualVector4 orientation_of(const Compilation& model, const OrientationField& fie
 namespace {
 
 // J = tr(S) I - S with S = m U U': xx yy zz xy xz yz.
-DualVector<6> tensor_of(const Compilation& model, const ConsistentInertiaField& I, const Dual& m,
-                        const std::string& where) {
-  const Dual x = model.fields.value(I.x, where + ".x"), y = model.fields.value(I.y, where + ".y"),
-             z = model.fields.value(I.z, where + ".z"), xy = model.fields.value(I.xy, where + ".xy"),
-             xz = model.fields.value(I.xz, where + ".xz"), yz = model.fields.value(I.yz, where + ".yz");
-  const Dual Sxx = x * x + xy * xy + xz * xz, Syy = y * y + yz * yz, Szz = z * z;
-  const Dual Sxy = xy * y + xz * yz, Sxz = xz * z, Syz = yz * z;
+FieldVector<6> tensor_of(const Compilation& model, const ConsistentInertiaField& I, const FieldValue& m,
+                         const std::string& where) {
+  const FieldValue x = model.fields.value(I.x, where + ".x"), y = model.fields.value(I.y, where + ".y"),
+                   z = model.fields.value(I.z, where + ".z"), xy = model.fields.value(I.xy, where + ".xy"),
+                   xz = model.fields.value(I.xz, where + ".xz"), yz = model.fields.value(I.yz, where + ".yz");
+  const FieldValue Sxx = x * x + xy * xy + xz * xz, Syy = y * y + yz * yz, Szz = z * z;
+  const FieldValue Sxy = xy * y + xz * yz, Sxz = xz * z, Syz = yz * z;
   return {m * (Syy + Szz), m * (Sxx + Szz), m * (Sxx + Syy), -m * Sxy, -m * Sxz, -m * Syz};
 }
 
-DualVector<6> inertia(const Compilation& model, const Body& body, const Dual& mass, const std::string& where) {
+FieldVector<6> inertia(const Compilation& model, const Body& body, const FieldValue& mass, const std::string& where) {
   if (body.consistent_inertia) return tensor_of(model, *body.consistent_inertia, mass, where + ".consistent");
   const InertiaField& I = body.inertia;
   return model.fields.values(std::array<Field, 6>{I.xx, I.yy, I.zz, I.xy, I.xz, I.yz}, where);
 }
 
-void add_body(Compilation& model, const Body& body, BodyData& out, DualVector3& com, DualVector4& p, DualVector3& r,
+void add_body(Compilation& model, const Body& body, BodyData& out, FieldVector3& com, FieldVector4& p, FieldVector3& r,
               const std::string& where) {
-  const Dual mass = model.fields.value(body.mass, where + ".mass");
+  const FieldValue mass = model.fields.value(body.mass, where + ".mass");
   if (mass.value() < 0) throw SceneError(where + ".mass: is negative, a mass must not be");
   out.mass = mass.value();
   out.slot_mass = model.fields.slot(mass);
@@ -61,7 +61,7 @@ void add_body(Compilation& model, const Body& body, BodyData& out, DualVector3& 
 
   p = orientation_of(model, body.orientation, where + ".orientation");
   r = model.fields.values(body.position, where + ".position") + rotated(p, com);
-  const DualVector<7> q{r[0], r[1], r[2], p[0], p[1], p[2], p[3]};
+  const FieldVector<7> q{r[0], r[1], r[2], p[0], p[1], p[2], p[3]};
   out.q = numbers(model.keep(out.slot_q, q));
   out.velocity = numbers(model.keep(out.slot_velocity, model.fields.values(body.velocity, where + ".velocity")));
   out.angular_velocity = numbers(
@@ -77,10 +77,10 @@ void compile_bodies(Compilation& model) {
   model.data.bodies[0].q << 0, 0, 0, 1, 0, 0, 0;
   model.data.body_names = {"ground"};
   model.com.resize(model.data.bodies.size());
-  for (Dual& c : model.com[0]) c = model.fields.constant(0);
+  for (FieldValue& c : model.com[0]) c = model.fields.constant(0);
   model.orientation.resize(model.data.bodies.size());
   model.position.resize(model.data.bodies.size());
-  for (Dual& c : model.position[0]) c = model.fields.constant(0);
+  for (FieldValue& c : model.position[0]) c = model.fields.constant(0);
   for (std::size_t k = 0; k < 4; ++k) model.orientation[0][k] = model.fields.constant(k == 0 ? 1 : 0);
   for (std::size_t i = 0; i < model.scene.bodies.size(); ++i) {
     add_body(model, model.scene.bodies[i], model.data.bodies[i + 1], model.com[i + 1], model.orientation[i + 1],

@@ -31,7 +31,7 @@ Law law(Compilation& model, const std::optional<Expression>& expression, const s
     add_kinks_in_time(*result.program, symbols.input("t"), model.data.rho, model.data.kinks);
     return result;
   }
-  const DualVector<4> x = model.fields.values(coefficients, where);
+  const FieldVector<4> x = model.fields.values(coefficients, where);
   const Vec<4> v = numbers(model.keep(result.slot, x));
   result.k = v(0), result.c = v(1), result.x0 = v(2), result.f0 = v(3);
   return result;
@@ -114,26 +114,26 @@ void add(Compilation& model, const BushingSpec& f, int force, const std::string&
   out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f.point1, where + ".point1")));
   out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f.point2, where + ".point2")));
   // R0 = A(p1)'A(p2), row by row
-  const DualVector4 &p1 = model.orientation[static_cast<std::size_t>(out.body1)],
-                    &p2 = model.orientation[static_cast<std::size_t>(out.body2)];
-  const DualVector4 relative = quaternion_product(inverse(p1), p2);
-  DualVector<9> R0;
+  const FieldVector4 &p1 = model.orientation[static_cast<std::size_t>(out.body1)],
+                     &p2 = model.orientation[static_cast<std::size_t>(out.body2)];
+  const FieldVector4 relative = quaternion_product(inverse(p1), p2);
+  FieldVector<9> R0;
   for (std::size_t k = 0; k < 3; ++k) {
-    DualVector3 axis{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
+    FieldVector3 axis{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
     axis[k] = model.fields.constant(1);
-    const DualVector3 column = rotated(relative, axis);
+    const FieldVector3 column = rotated(relative, axis);
     for (std::size_t i = 0; i < 3; ++i) R0[3 * i + k] = column[i];
   }
   const Vec<9> entries = numbers(model.keep(out.slot_R0, R0));
   for (int i = 0; i < 3; ++i) out.R0.row(i) = entries.segment<3>(3 * i).transpose();
-  DualVector<12> law;
+  FieldVector<12> law;
   const std::array<std::pair<const VectorField*, const char*>, 4> parts{
       {{&f.stiffness, ".stiffness"},
        {&f.damping, ".damping"},
        {&f.torsional_stiffness, ".torsional_stiffness"},
        {&f.torsional_damping, ".torsional_damping"}}};
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    const DualVector3 x = model.fields.values(*parts[k].first, where + parts[k].second);
+    const FieldVector3 x = model.fields.values(*parts[k].first, where + parts[k].second);
     std::copy(x.begin(), x.end(), law.begin() + static_cast<std::ptrdiff_t>(3 * k));
   }
   const Vec<12> x = numbers(model.keep(out.slot_law, law));
@@ -145,7 +145,7 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
   const Joint& joint = model.scene.joints[model.joint_index(f.joint, where + ".joint")];
   FrictionLaw law;
   // Without breakaway the level is coulomb at any Stribeck velocity.
-  const DualVector<FrictionLaw::kFields> x{
+  const FieldVector<FrictionLaw::kFields> x{
       model.fields.value(f.coulomb, where + ".coulomb"),
       model.fields.value(f.smooth_velocity, where + ".smooth_velocity"),
       model.fields.value(f.viscous, where + ".viscous"),
@@ -184,7 +184,7 @@ void add(Compilation& model, const UserForceSpec& f, int, const std::string& whe
   TermValues values{Eigen::VectorXd(count), Eigen::MatrixXd::Zero(count, model.data.rho.size())};
   for (Eigen::Index i = 0; i < count; ++i) {
     const TermParameter& parameter = f.parameters[static_cast<std::size_t>(i)];
-    const Dual x = model.fields.value(parameter.value, child_path(where + ".parameters", parameter.name));
+    const FieldValue x = model.fields.value(parameter.value, child_path(where + ".parameters", parameter.name));
     values.p(i) = x.value();
     for (std::size_t k = 0; k < model.data.active.size(); ++k)
       values.p_rho(i, model.data.active[k]) = x.derivatives()(static_cast<Eigen::Index>(k));

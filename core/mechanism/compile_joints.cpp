@@ -15,13 +15,13 @@ class JointVectors {
   JointVectors(Compilation& model, const Joint& joint, int body1, int body2, std::string where)
       : model_(model), joint_(joint), body1_(body1), body2_(body2), where_(std::move(where)) {}
 
-  const DualVector3& operator()(JointVector which) {
+  const FieldVector3& operator()(JointVector which) {
     const auto found = vectors_.find(which);
     return found != vectors_.end() ? found->second : vectors_.emplace(which, make(which)).first->second;
   }
 
  private:
-  DualVector3 make(JointVector which) {
+  FieldVector3 make(JointVector which) {
     switch (which) {
       case JointVector::none:
         break;
@@ -54,15 +54,15 @@ class JointVectors {
     return {};
   }
 
-  DualVector3 normal(int body, const std::optional<PointField>& field, JointVector axis, const char* key) {
-    const DualVector3 n = perpendicular_part(model_.direction(body, field, where_ + key), (*this)(axis));
+  FieldVector3 normal(int body, const std::optional<PointField>& field, JointVector axis, const char* key) {
+    const FieldVector3 n = perpendicular_part(model_.direction(body, field, where_ + key), (*this)(axis));
     if (!numbers(n).allFinite()) throw SceneError(where_ + key + ": is parallel to the axis");
     return n;
   }
   // Returns normal2. If the file omits it, this is the first normal as body 2 sees it in the file.
-  DualVector3 second_normal() {
+  FieldVector3 second_normal() {
     if (joint_.normal2) return normal(body2_, joint_.normal2, JointVector::axis2, ".normal2");
-    const DualVector3 n =
+    const FieldVector3 n =
         model_.normal_in_file(body1_, (*this)(JointVector::keep1), body2_, (*this)(JointVector::axis2));
     if (!numbers(n).allFinite()) {
       throw SceneError(where_ +
@@ -71,8 +71,8 @@ class JointVectors {
     }
     return n;
   }
-  DualVector3 global_axis(int body, std::size_t k) const {
-    DualVector3 e{model_.fields.constant(0), model_.fields.constant(0), model_.fields.constant(0)};
+  FieldVector3 global_axis(int body, std::size_t k) const {
+    FieldVector3 e{model_.fields.constant(0), model_.fields.constant(0), model_.fields.constant(0)};
     e[k] = model_.fields.constant(1);
     return rotated(inverse(model_.orientation[at(body)]), e);
   }
@@ -81,7 +81,7 @@ class JointVectors {
   const Joint& joint_;
   int body1_, body2_;
   std::string where_;
-  std::map<JointVector, DualVector3> vectors_;
+  std::map<JointVector, FieldVector3> vectors_;
 };
 
 void set_vectors(Compilation& model, Constraint& c, JointVectors& of, JointVector s1, JointVector s2, JointVector s3) {
@@ -96,7 +96,7 @@ void set_vectors(Compilation& model, Constraint& c, JointVectors& of, JointVecto
       c.primitive);
 }
 
-void add_constant(Compilation& model, int row, const Dual& value) {
+void add_constant(Compilation& model, int row, const FieldValue& value) {
   RowLaw law;
   law.row = row;
   law.law.constant = value.value();
@@ -111,13 +111,14 @@ void place(const JointMeasure<P>& joint, Constraint& c) {
   c.slot1 = joint.slot1, c.slot2 = joint.slot2, c.slot3 = joint.slot3;
 }
 
-void set_factor(Compilation& model, Constraint& c, const Dual& factor) {
+void set_factor(Compilation& model, Constraint& c, const FieldValue& factor) {
   c.factor = factor.value();
   c.slot_factor = model.fields.slot(factor);
 }
 
 // Phi = second - factor * first - constant
-void tie(Compilation& model, int joint, Constraint second, Constraint first, const Dual& factor, const Dual& constant) {
+void tie(Compilation& model, int joint, Constraint second, Constraint first, const FieldValue& factor,
+         const FieldValue& constant) {
   second.joint = first.joint = joint;
   const int row = model.add_constraint(std::move(second)).row;
   set_factor(model, first, -factor);
@@ -178,9 +179,9 @@ void compile_joints(Compilation& model) {
   }
 }
 
-DualVector3 Compilation::normal_in_file(int body1, const DualVector3& normal1, int body2,
-                                        const DualVector3& axis2) const {
-  const DualVector3 global = rotated(orientation[at(body1)], normal1);
+FieldVector3 Compilation::normal_in_file(int body1, const FieldVector3& normal1, int body2,
+                                         const FieldVector3& axis2) const {
+  const FieldVector3 global = rotated(orientation[at(body1)], normal1);
   return perpendicular_part(rotated(inverse(orientation[at(body2)]), global), axis2);
 }
 
@@ -226,14 +227,14 @@ JointDisplacement Compilation::joint_displacement(const std::string& name, const
   return x;
 }
 
-Dual Compilation::joint_displacement_in_file(const std::string& name, const std::string& where) const {
+FieldValue Compilation::joint_displacement_in_file(const std::string& name, const std::string& where) const {
   const Joint& joint = scene.joints[joint_index(name, where)];
   const std::string path = child_path("joints", joint_index(name, where));
   const std::size_t b1 = at(body_index(joint.body1, path)), b2 = at(body_index(joint.body2, path));
   auto global = [&](std::size_t body, const PointField& p, const char* key) {
     return position[body] + rotated(orientation[body], point(static_cast<int>(body), p, path + key));
   };
-  const DualVector3 axis = rotated(orientation[b1], direction(static_cast<int>(b1), joint.axis1, path + ".axis1"));
+  const FieldVector3 axis = rotated(orientation[b1], direction(static_cast<int>(b1), joint.axis1, path + ".axis1"));
   return dot(axis, global(b2, joint.point2, ".point2") - global(b1, joint.point1, ".point1"));
 }
 
@@ -249,9 +250,9 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
   }
   JointAngle angle;
   angle.body1 = body_index(joint.body1, joint_path), angle.body2 = body_index(joint.body2, joint_path);
-  const DualVector3 a1 = direction(angle.body1, joint.axis1, joint_path + ".axis1");
-  const DualVector3 a2 = direction(angle.body2, joint.axis2, joint_path + ".axis2");
-  DualVector3 n1, n2;
+  const FieldVector3 a1 = direction(angle.body1, joint.axis1, joint_path + ".axis1");
+  const FieldVector3 a2 = direction(angle.body2, joint.axis2, joint_path + ".axis2");
+  FieldVector3 n1, n2;
   if (joint.normal1 && joint.normal2) {
     n1 = perpendicular_part(direction(angle.body1, joint.normal1, joint_path + ".normal1"), a1);
     n2 = perpendicular_part(direction(angle.body2, joint.normal2, joint_path + ".normal2"), a2);
@@ -289,7 +290,7 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
 int Compilation::angle_about(int body1, int body2, const std::optional<PointField>& axis, const std::string& where) {
   JointAngle angle;
   angle.body1 = body1, angle.body2 = body2;
-  const DualVector3 a = direction(body1, axis, where + ".axis"), n = perpendicular(a);
+  const FieldVector3 a = direction(body1, axis, where + ".axis"), n = perpendicular(a);
   angle.measure.s1 = numbers(keep(angle.slot1, n));
   angle.measure.s3 = numbers(keep(angle.slot3, cross(a, n)));
   angle.measure.s2 = numbers(keep(angle.slot2, n));

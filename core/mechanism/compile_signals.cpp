@@ -10,7 +10,7 @@ void compile_signals(Compilation& model) {
   for (const Signal& signal : model.scene.signals) {
     const std::string where = child_path("signals", signal.name);
     if (!signal.curve) throw SceneError(where + ": has no samples: nothing has read its file");
-    const Dual delay = model.fields.value(signal.delay, where + ".delay");
+    const FieldValue delay = model.fields.value(signal.delay, where + ".delay");
     if (const auto why = uncovered(covered_by(*signal.curve, delay.value()), s.start_time, s.end_time))
       throw SceneError(where + ": " + *why);
     if (signal.interpolation == Interpolation::hold && !delay.derivatives().isZero(0))

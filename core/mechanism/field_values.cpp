@@ -13,7 +13,7 @@ FieldValues::FieldValues(std::shared_ptr<ScenePrograms> programs, const Eigen::V
       active_index_(active),
       active_(static_cast<Eigen::Index>(active.size())) {}
 
-Dual FieldValues::value(const Field& field, const std::string& where) const {
+FieldValue FieldValues::value(const Field& field, const std::string& where) const {
   if (field.is_number()) return constant(field.number());
   try {
     const std::shared_ptr<const Program> program = programs_->field(field);
@@ -27,7 +27,7 @@ Dual FieldValues::value(const Field& field, const std::string& where) const {
     if (!std::isfinite(v) || !d.allFinite()) {
       throw SceneError(where + ": '" + field.text() + "' or its derivative is not finite at these parameters");
     }
-    return Dual(v, d);
+    return FieldValue(v, d);
   } catch (const UnknownName& e) {
     throw SceneError(where + ": " + e.what());
   }
@@ -39,54 +39,54 @@ Eigen::MatrixXd FieldValues::theta_rho() const {
   return result;
 }
 
-DualVector3 operator+(const DualVector3& a, const DualVector3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-DualVector3 operator-(const DualVector3& a, const DualVector3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-DualVector3 operator*(const Dual& a, const DualVector3& b) { return {a * b[0], a * b[1], a * b[2]}; }
-Dual dot(const DualVector3& a, const DualVector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-DualVector3 cross(const DualVector3& a, const DualVector3& b) {
+FieldVector3 operator+(const FieldVector3& a, const FieldVector3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+FieldVector3 operator-(const FieldVector3& a, const FieldVector3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+FieldVector3 operator*(const FieldValue& a, const FieldVector3& b) { return {a * b[0], a * b[1], a * b[2]}; }
+FieldValue dot(const FieldVector3& a, const FieldVector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+FieldVector3 cross(const FieldVector3& a, const FieldVector3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-DualVector3 unit(const DualVector3& a) {
-  const Dual norm = sqrt(dot(a, a));
+FieldVector3 unit(const FieldVector3& a) {
+  const FieldValue norm = sqrt(dot(a, a));
   return {a[0] / norm, a[1] / norm, a[2] / norm};
 }
 
-DualVector3 perpendicular(const DualVector3& a) {
+FieldVector3 perpendicular(const FieldVector3& a) {
   Eigen::Index k = 0;
   numbers(a).cwiseAbs().minCoeff(&k);
-  const Dual zero = 0.0 * a[0], one = zero + 1.0;
-  DualVector3 e{zero, zero, zero};
+  const FieldValue zero = 0.0 * a[0], one = zero + 1.0;
+  FieldVector3 e{zero, zero, zero};
   e[static_cast<std::size_t>(k)] = one;
   return unit(cross(a, e));
 }
 
-DualVector3 perpendicular_part(const DualVector3& n, const DualVector3& a) {
-  const Dual along = dot(n, a);
+FieldVector3 perpendicular_part(const FieldVector3& n, const FieldVector3& a) {
+  const FieldValue along = dot(n, a);
   return unit(n - along * a);
 }
 
-DualVector4 unit(const DualVector4& p) {
-  const Dual norm = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+FieldVector4 unit(const FieldVector4& p) {
+  const FieldValue norm = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
   return {p[0] / norm, p[1] / norm, p[2] / norm, p[3] / norm};
 }
 
-DualVector4 inverse(const DualVector4& p) { return {p[0], -p[1], -p[2], -p[3]}; }
+FieldVector4 inverse(const FieldVector4& p) { return {p[0], -p[1], -p[2], -p[3]}; }
 
-DualVector4 quaternion_product(const DualVector4& a, const DualVector4& b) {
+FieldVector4 quaternion_product(const FieldVector4& a, const FieldVector4& b) {
   return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
           a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
 }
 
-DualVector4 euler_parameters(const DualVector3& unit_axis, const Dual& angle) {
-  const Dual half = 0.5 * angle;
-  const Dual c = cos(half), s = sin(half);
+FieldVector4 euler_parameters(const FieldVector3& unit_axis, const FieldValue& angle) {
+  const FieldValue half = 0.5 * angle;
+  const FieldValue c = cos(half), s = sin(half);
   return {c, s * unit_axis[0], s * unit_axis[1], s * unit_axis[2]};
 }
 
-DualVector3 rotated(const DualVector4& p, const DualVector3& s) {
-  const DualVector3 e{p[1], p[2], p[3]};
-  const Dual a = p[0] * p[0] - dot(e, e), b = 2.0 * dot(e, s), c = 2.0 * p[0];
+FieldVector3 rotated(const FieldVector4& p, const FieldVector3& s) {
+  const FieldVector3 e{p[1], p[2], p[3]};
+  const FieldValue a = p[0] * p[0] - dot(e, e), b = 2.0 * dot(e, s), c = 2.0 * p[0];
   return a * s + b * e + c * cross(e, s);
 }
 

@@ -6,19 +6,18 @@
 #include <Eigen/Core>
 #include <array>
 #include <string>
-#include <unsupported/Eigen/AutoDiff>
 #include <vector>
 
 #include "core/expression/program.hpp"
-#include "core/linear/fixed_size.hpp"
+#include "core/linear/dual_numbers.hpp"
 #include "core/mechanism/scene_programs.hpp"
 #include "core/scene/scene.hpp"
 
 namespace mbsopt {
 
-using Dual = Eigen::AutoDiffScalar<Eigen::VectorXd>;  // always carries a derivative of full length
+using FieldValue = DualNumber<Eigen::Dynamic>;  // always carries all derivatives
 template <std::size_t N>
-using DualVector = std::array<Dual, N>;
+using FieldVector = std::array<FieldValue, N>;
 
 class FieldValues {
  public:
@@ -26,32 +25,32 @@ class FieldValues {
 
   // where is the place in the scene, for errors ("bodies[2].mass"). Throws SceneError on unknown names and infinite
   // values.
-  Dual value(const Field& field, const std::string& where) const;
+  FieldValue value(const Field& field, const std::string& where) const;
   template <std::size_t N>
-  DualVector<N> values(const std::array<Field, N>& fields, const std::string& where) const {
-    DualVector<N> result;
+  FieldVector<N> values(const std::array<Field, N>& fields, const std::string& where) const {
+    FieldVector<N> result;
     for (std::size_t i = 0; i < N; ++i) {
       const Field& field = fields[i];
       result[i] = field.is_number() ? constant(field.number()) : value(field, where + "[" + std::to_string(i) + "]");
     }
     return result;
   }
-  Dual constant(double x) const { return Dual(x, Eigen::VectorXd::Zero(active_)); }
+  FieldValue constant(double x) const { return FieldValue(x, Eigen::VectorXd::Zero(active_)); }
 
   ScenePrograms& programs() const { return *programs_; }
   const Symbols& symbols() const { return programs_->symbols(); }
 
   // Returns the slot of some numbers: their derivatives become consecutive rows. It is -1 if all derivatives are zero.
   template <std::size_t N>
-  int slot(const DualVector<N>& x) {
+  int slot(const FieldVector<N>& x) {
     bool depends = false;
-    for (const Dual& c : x) depends = depends || !c.derivatives().isZero(0);
+    for (const FieldValue& c : x) depends = depends || !c.derivatives().isZero(0);
     if (!depends) return -1;
     const int first = static_cast<int>(rows_.size());
-    for (const Dual& c : x) rows_.push_back(c.derivatives());
+    for (const FieldValue& c : x) rows_.push_back(c.derivatives());
     return first;
   }
-  int slot(const Dual& x) { return slot(DualVector<1>{x}); }
+  int slot(const FieldValue& x) { return slot(FieldVector<1>{x}); }
   Eigen::MatrixXd theta_rho() const;  // all rows given out, slots x active
 
  private:
@@ -63,31 +62,31 @@ class FieldValues {
 };
 
 template <std::size_t N>
-Vec<static_cast<int>(N)> numbers(const DualVector<N>& x) {
+Vec<static_cast<int>(N)> numbers(const FieldVector<N>& x) {
   Vec<static_cast<int>(N)> v;
   for (std::size_t i = 0; i < N; ++i) v(static_cast<Eigen::Index>(i)) = x[i].value();
   return v;
 }
 
-using DualVector3 = DualVector<3>;
-using DualVector4 = DualVector<4>;
+using FieldVector3 = FieldVector<3>;
+using FieldVector4 = FieldVector<4>;
 
-DualVector3 operator+(const DualVector3& a, const DualVector3& b);
-DualVector3 operator-(const DualVector3& a, const DualVector3& b);
-DualVector3 operator*(const Dual& a, const DualVector3& b);
-Dual dot(const DualVector3& a, const DualVector3& b);
-DualVector3 cross(const DualVector3& a, const DualVector3& b);
-DualVector3 unit(const DualVector3& a);  // a not zero
+FieldVector3 operator+(const FieldVector3& a, const FieldVector3& b);
+FieldVector3 operator-(const FieldVector3& a, const FieldVector3& b);
+FieldVector3 operator*(const FieldValue& a, const FieldVector3& b);
+FieldValue dot(const FieldVector3& a, const FieldVector3& b);
+FieldVector3 cross(const FieldVector3& a, const FieldVector3& b);
+FieldVector3 unit(const FieldVector3& a);  // a not zero
 
 // A unit vector perpendicular to unit a, a smooth function of a: a x e_k normalised, k the smallest component of a.
-DualVector3 perpendicular(const DualVector3& a);
+FieldVector3 perpendicular(const FieldVector3& a);
 // Component of n perpendicular to unit a, normalised.
-DualVector3 perpendicular_part(const DualVector3& n, const DualVector3& a);
+FieldVector3 perpendicular_part(const FieldVector3& n, const FieldVector3& a);
 
-DualVector4 unit(const DualVector4& p);
-DualVector4 inverse(const DualVector4& p);  // of a unit p: the opposite rotation
-DualVector4 quaternion_product(const DualVector4& a, const DualVector4& b);
-DualVector4 euler_parameters(const DualVector3& unit_axis, const Dual& angle);
-DualVector3 rotated(const DualVector4& p, const DualVector3& s);  // A(p) s, p unit
+FieldVector4 unit(const FieldVector4& p);
+FieldVector4 inverse(const FieldVector4& p);  // of a unit p: the opposite rotation
+FieldVector4 quaternion_product(const FieldVector4& a, const FieldVector4& b);
+FieldVector4 euler_parameters(const FieldVector3& unit_axis, const FieldValue& angle);
+FieldVector3 rotated(const FieldVector4& p, const FieldVector3& s);  // A(p) s, p unit
 
 }  // namespace mbsopt

@@ -69,7 +69,7 @@ std::unique_ptr<SensorFunction> make_imu(Compilation& model, const Sensor& s, co
   const std::size_t k = s.component.size() == 2 ? std::string_view("xyz").find(s.component[1]) : std::string::npos;
   if (k == std::string::npos || (s.component[0] != 'a' && s.component[0] != 'w'))
     throw SceneError(where + ".component: is '" + s.component + "'; allowed: ax, ay, az, wx, wy, wz");
-  DualVector3 e{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
+  FieldVector3 e{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
   e[k] = model.fields.constant(1);
   MountAxis axis;
   axis.m = numbers(model.keep(axis.slot, rotated(orientation_of(model, s.axes, where + ".axes"), e)));

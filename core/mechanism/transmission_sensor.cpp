@@ -58,7 +58,7 @@ Link link_from(Compilation& model, const std::string& name, const PointField& po
                const std::string& where) {
   Link link;
   link.body = model.body_index(name, where);
-  std::vector<DualVector3> ends;
+  std::vector<FieldVector3> ends;
   for (std::size_t i = 0; i < model.scene.joints.size(); ++i) {
     const Joint& joint = model.scene.joints[i];
     if (i == here || !has_word(kPins, joint.type)) continue;

@@ -18,7 +18,6 @@ class BodyInPlane {
   using Frame = InPlane::Frame;
   using FrameBar = InPlane::FrameBar;
   using FrameTangent = InPlane::FrameTangent;
-  using Lane = LaneDual::Lane;
 
  public:
   using Space = InPlane;
@@ -85,8 +84,8 @@ class BodyInPlane {
 
   void tilde_tangent(const LaneRows& y_hat_dir, const Frame& tilde, Direction& q_dir, FrameTangent& tilde_dir) const {
     const PlaneDual r = in_y_.vector(r_hat_, y_hat_dir, q_), P = in_y_.turn(k_, P_hat_, y_hat_dir, q_ + 3);
-    q_dir.row(0) = r.re.d.matrix(), q_dir.row(1) = r.im.d.matrix();
-    q_dir.row(2) = ((2 / squared_norm(P_hat_)) * (P_hat_.re * P.im.d - P_hat_.im * P.re.d)).matrix();
+    q_dir.row(0) = lanes(r.re), q_dir.row(1) = lanes(r.im);
+    q_dir.row(2) = (2 / squared_norm(P_hat_)) * (P_hat_.re * lanes(P.im) - P_hat_.im * lanes(P.re));
     set_position(tilde, q_dir, tilde_dir);
   }
   void position_tangent(const Vec<3>&, const Direction& q_dir, Lanes<3>& x) const { x = q_dir; }
@@ -98,11 +97,11 @@ class BodyInPlane {
   void velocity_tangent(const LaneRows& y_hat_dir, const Vec<3>&, const Frame& f, const Direction& q_dir,
                         Direction& v_dir, FrameTangent& f_dir) const {
     const PlaneDual rdot = in_y_.vector(rdot_hat_, y_hat_dir, v_), Pdot = in_y_.turn(k_, Pdot_hat_, y_hat_dir, v_ + 3);
-    v_dir.row(0) = rdot.re.d.matrix(), v_dir.row(1) = rdot.im.d.matrix();
-    v_dir.row(2) = (2 * (P_.re * Pdot.im.d - P_.im * Pdot.re.d)).matrix() - dot(P_, Pdot_hat_) * q_dir.row(2);
+    v_dir.row(0) = lanes(rdot.re), v_dir.row(1) = lanes(rdot.im);
+    v_dir.row(2) = 2 * (P_.re * lanes(Pdot.im) - P_.im * lanes(Pdot.re)) - dot(P_, Pdot_hat_) * q_dir.row(2);
     set_position(f, q_dir, f_dir);
-    f_dir.rdot = {{f.rdot.re, rdot.re.d}, {f.rdot.im, rdot.im.d}};
-    f_dir.Adot = times_i(LaneDual{w_, v_dir.row(2).array()} * f_dir.A);
+    f_dir.rdot = {dual(f.rdot.re, lanes(rdot.re)), dual(f.rdot.im, lanes(rdot.im))};
+    f_dir.Adot = times_i(dual(w_, v_dir.row(2)) * f_dir.A);
   }
   void add_velocity_tangent(const Lanes<3>& u_dir, Direction& v_dir) const { v_dir += u_dir; }
   void write_position_tangent(const Direction& q_dir, const LaneRows& y_hat_dir, LaneRows& y_dir) const {
@@ -111,7 +110,7 @@ class BodyInPlane {
   // Pdot = i w/2 P
   void write_velocity_tangent(const Direction& q_dir, const Direction& v_dir, const LaneRows& y_hat_dir,
                               LaneRows& y_dir) const {
-    const PlaneDual Pdot = times_i(LaneDual{0.5 * w_, Lane(0.5 * v_dir.row(2).array())} * turned(q_dir));
+    const PlaneDual Pdot = times_i(dual(0.5 * w_, 0.5 * v_dir.row(2)) * turned(q_dir));
     replace(v_, v_dir, Pdot, y_hat_dir, y_dir);
   }
 
@@ -154,14 +153,14 @@ class BodyInPlane {
   // The frame f along the direction of (r, theta).
   static void set_position(const Frame& f, const Direction& q_dir, FrameTangent& f_dir) {
     const Plane iA = times_i(f.A);
-    f_dir.r = {{f.r.re, q_dir.row(0).array()}, {f.r.im, q_dir.row(1).array()}};
-    f_dir.A = {{f.A.re, Lane(iA.re * q_dir.row(2).array())}, {f.A.im, Lane(iA.im * q_dir.row(2).array())}};
+    f_dir.r = {dual(f.r.re, q_dir.row(0)), dual(f.r.im, q_dir.row(1))};
+    f_dir.A = {dual(f.A.re, iA.re * q_dir.row(2)), dual(f.A.im, iA.im * q_dir.row(2))};
   }
 
   // P' = i theta'/2 P
   PlaneDual turned(const Direction& q_dir) const {
     const Plane iP = times_i(P_);
-    return {{P_.re, Lane(0.5 * iP.re * q_dir.row(2).array())}, {P_.im, Lane(0.5 * iP.im * q_dir.row(2).array())}};
+    return {dual(P_.re, 0.5 * iP.re * q_dir.row(2)), dual(P_.im, 0.5 * iP.im * q_dir.row(2))};
   }
   void replace(Eigen::Index first, const Direction& dir, const PlaneDual& turn, const LaneRows& y_hat_dir,
                LaneRows& y_dir) const {

@@ -9,8 +9,8 @@
 //     T at_end(const VectorX<T>& y, const VectorX<T>&) const { return (y(0) - 1.) * (y(0) - 1.); }
 //   };
 //
-// core/force/differentiated_force.hpp lists the types T and how each function is called. A gradient in y takes two
-// evaluations with dual numbers per body.
+// core/force/differentiated_force.hpp lists the types T and how each function is called. A gradient takes one
+// evaluation with dual numbers per kLanes entries of y or rho.
 #pragma once
 
 #include "core/linear/dual_numbers.hpp"
