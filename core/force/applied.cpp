@@ -1,17 +1,22 @@
 #include "core/force/applied.hpp"
 
-#include "core/body/lanes.hpp"
+#include "core/body/dual_frame.hpp"
 
 namespace mbsopt {
 
-void AppliedForce::add_load(const Vector3d& c, const Frame& f, Vec<6>& load) const {
+template <class F, class S, class Load>
+void AppliedForce::add(const S& c, const F& f, const S& point, Load& load) const {
+  using V = VectorOf<F>;
   if (is_torque) {
-    load.tail<3>() += in_body_axes ? c : Vector3d(f.A.transpose() * c);
-    return;
+    load.template bottomRows<3>() += load_part(in_body_axes ? V(c) : in_body(f, V(c)));
+  } else {
+    add_force(f, point, in_body_axes ? in_space(f, c) : V(c), load);
   }
-  const Vector3d F = in_body_axes ? Vector3d(f.A * c) : c;
-  load.head<3>() += F;
-  load.tail<3>() += s.cross(f.A.transpose() * F);
+}
+void AppliedForce::add_load(const Vector3d& c, const Frame& f, Vec<6>& load) const { add(c, f, s, load); }
+void AppliedForce::tangent(const Vector3d& c, const Lanes<3>& dc, const Frame& f, const FrameTangent& t,
+                           const Lanes<3>* ds, Lanes<6>& load) const {
+  add(BodyVector{c, &dc}, DualFrame{f, t}, BodyVector{s, ds}, load);
 }
 
 Vector3d AppliedForce::pull_back(const Vector3d& c, const Frame& f, FrameBar& bar, Eigen::VectorXd& theta_bar) const {
@@ -26,19 +31,6 @@ Vector3d AppliedForce::pull_back(const Vector3d& c, const Frame& f, FrameBar& ba
   if (!in_body_axes) return P_eta;
   bar.A += P_eta * c.transpose();
   return f.A.transpose() * P_eta;
-}
-
-void AppliedForce::tangent(const Vector3d& c, const Lanes<3>& dc, const Frame& f, const FrameTangent& t,
-                           const Lanes<3>* ds, Lanes<6>& load) const {
-  if (is_torque) {
-    load.bottomRows<3>() += in_body_axes ? dc : Lanes<3>(transposed_times(t.A, c) + f.A.transpose() * dc);
-    return;
-  }
-  const Vector3d F = in_body_axes ? Vector3d(f.A * c) : c;
-  const Lanes<3> dF = in_body_axes ? Lanes<3>(times(t.A, c) + f.A * dc) : dc;
-  load.topRows<3>() += dF;
-  load.bottomRows<3>() += cross(s, transposed_times(t.A, F) + f.A.transpose() * dF);
-  if (ds) load.bottomRows<3>() -= cross(f.A.transpose() * F, *ds);
 }
 
 }  // namespace mbsopt

@@ -31,6 +31,10 @@ struct AppliedForce {
   // The tangent of the load. dc and ds are directions of c and s; a null ds is constant.
   void tangent(const Vector3d& c, const Lanes<3>& dc, const Frame& f, const FrameTangent& t, const Lanes<3>* ds,
                Lanes<6>& load) const;
+
+ private:
+  template <class F, class S, class Load>
+  void add(const S& c, const F& f, const S& point, Load& load) const;  // the load, or its tangent
 };
 
 }  // namespace mbsopt

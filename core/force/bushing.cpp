@@ -2,7 +2,8 @@
 
 #include <array>
 #include <cmath>
-#include <unsupported/Eigen/AutoDiff>
+
+#include "core/linear/dual_numbers.hpp"
 
 namespace mbsopt {
 
@@ -58,9 +59,7 @@ Eigen::Matrix<T, 3, 1> twice_vee(const Eigen::Matrix<T, 3, 3>& X) {
   return {T(X(2, 1) - X(1, 2)), T(X(0, 2) - X(2, 0)), T(X(1, 0) - X(0, 1))};
 }
 
-// The loads for any scalar: numbers, or numbers with kLanes directional derivatives.
-using DualLanes = Eigen::AutoDiffScalar<Eigen::Matrix<double, kLanes, 1>>;
-
+// The loads for any scalar: double, or Dual for their tangents.
 template <class T>
 struct FrameOf {
   Eigen::Matrix<T, 3, 1> r, rdot;
@@ -72,24 +71,16 @@ struct FieldsOf {
   Eigen::Matrix<T, 3, 3> R0;
 };
 
-struct FactorPair {
-  double g, g1;
-};
-FactorPair factors(double c) {
-  const RotationFactor f = rotation_factor(c);
-  return {f.g, f.g1};
-}
-struct DualFactorPair {
-  DualLanes g, g1;
-};
-DualFactorPair factors(const DualLanes& c) {
-  const RotationFactor f = rotation_factor(c.value());
-  return {DualLanes(f.g, f.g1 * c.derivatives()), DualLanes(f.g1, f.g2 * c.derivatives())};
-}
+double value_of(double x) { return x; }
+double value_of(const Dual& x) { return x.value(); }
+// A function's value at c, from its value and slope there.
+double chained(double value, double, double) { return value; }
+Dual chained(double value, double slope, const Dual& c) { return {value, slope * c.derivatives()}; }
 
+// All calls are inlined: dual numbers that functions return are slow.
 template <class T>
-void loads(const FrameOf<T>& f1, const FrameOf<T>& f2, const FieldsOf<T>& x, Eigen::Matrix<T, 6, 1>& load1,
-           Eigen::Matrix<T, 6, 1>& load2) {
+[[gnu::flatten]] void loads(const FrameOf<T>& f1, const FrameOf<T>& f2, const FieldsOf<T>& x,
+                            Eigen::Matrix<T, 6, 1>& load1, Eigen::Matrix<T, 6, 1>& load2) {
   using V = Eigen::Matrix<T, 3, 1>;
   using M3 = Eigen::Matrix<T, 3, 3>;
   const M3 A1t = f1.A.transpose(), A2t = f2.A.transpose(), A1dot_t = f1.Adot.transpose(), R0t = x.R0.transpose();
@@ -103,7 +94,8 @@ void loads(const FrameOf<T>& f1, const FrameOf<T>& f2, const FieldsOf<T>& x, Eig
   const T half(0.5), one(1.0);
   const V a = V(twice_vee<T>(R)) * half, a_dot = V(twice_vee<T>(Rdot)) * half;
   const T c = (R(0, 0) + R(1, 1) + R(2, 2) - one) * half, c_dot = (Rdot(0, 0) + Rdot(1, 1) + Rdot(2, 2)) * half;
-  const auto [g, g1] = factors(c);
+  const RotationFactor factor = rotation_factor(value_of(c));
+  const T g = chained(factor.g, factor.g1, c), g1 = chained(factor.g1, factor.g2, c);
   const T g_dot = g1 * c_dot;
   const V theta = a * g, thetadot = V(a * g_dot) + V(a_dot * g);
   const V tau = V(x.Kt.cwiseProduct(theta)) + V(x.Ct.cwiseProduct(thetadot));
@@ -120,25 +112,25 @@ void loads(const FrameOf<T>& f1, const FrameOf<T>& f2, const FieldsOf<T>& x, Eig
 }
 
 template <int N>
-Eigen::Matrix<DualLanes, N, 1> dual(const Vec<N>& value, const Lanes<N>* direction) {
-  Eigen::Matrix<DualLanes, N, 1> x;
+Eigen::Matrix<Dual, N, 1> dual(const Vec<N>& value, const Lanes<N>* direction) {
+  Eigen::Matrix<Dual, N, 1> x;
   for (int i = 0; i < N; ++i) {
-    x(i) = DualLanes(value(i));
+    x(i) = Dual(value(i));
     if (direction) x(i).derivatives() = direction->row(i).transpose();
   }
   return x;
 }
-Eigen::Matrix<DualLanes, 3, 3> dual(const Matrix3d& value, const Lanes<9>* direction) {
-  Eigen::Matrix<DualLanes, 3, 3> x;
+Eigen::Matrix<Dual, 3, 3> dual(const Matrix3d& value, const Lanes<9>* direction) {
+  Eigen::Matrix<Dual, 3, 3> x;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      x(i, j) = DualLanes(value(i, j));
+      x(i, j) = Dual(value(i, j));
       if (direction) x(i, j).derivatives() = direction->row(3 * i + j).transpose();
     }
   }
   return x;
 }
-FrameOf<DualLanes> dual(const Frame& f, const FrameTangent& t) {
+FrameOf<Dual> dual(const Frame& f, const FrameTangent& t) {
   return {dual<3>(f.r, &t.r), dual<3>(f.rdot, &t.rdot), dual(f.A, &t.A), dual(f.Adot, &t.Adot)};
 }
 
@@ -153,11 +145,11 @@ void Bushing::tangent(const At&, const Frame& f1, const Frame& f2, const FrameTa
                       const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const {
   Vec<12> law;
   law << K, C, Kt, Ct;
-  const Eigen::Matrix<DualLanes, 12, 1> x = dual<12>(law, dir.law);
-  const FieldsOf<DualLanes> fields{dual<3>(s1, dir.s1), dual<3>(s2, dir.s2), x.segment<3>(0), x.segment<3>(3),
-                                   x.segment<3>(6),     x.segment<3>(9),     dual(R0, dir.R0)};
-  Eigen::Matrix<DualLanes, 6, 1> l1 = Eigen::Matrix<DualLanes, 6, 1>::Constant(DualLanes(0.0)), l2 = l1;
-  loads<DualLanes>(dual(f1, t1), dual(f2, t2), fields, l1, l2);
+  const Eigen::Matrix<Dual, 12, 1> x = dual<12>(law, dir.law);
+  const FieldsOf<Dual> fields{dual<3>(s1, dir.s1), dual<3>(s2, dir.s2), x.segment<3>(0), x.segment<3>(3),
+                              x.segment<3>(6),     x.segment<3>(9),     dual(R0, dir.R0)};
+  Eigen::Matrix<Dual, 6, 1> l1 = Eigen::Matrix<Dual, 6, 1>::Constant(Dual(0.0)), l2 = l1;
+  loads<Dual>(dual(f1, t1), dual(f2, t2), fields, l1, l2);
   for (int i = 0; i < 6; ++i) {
     load1.row(i) += l1(i).derivatives().transpose();
     load2.row(i) += l2(i).derivatives().transpose();

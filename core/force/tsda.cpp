@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/body/lanes.hpp"
+#include "core/body/dual_frame.hpp"
 
 namespace mbsopt {
 
@@ -40,10 +40,8 @@ void TsdaForce::pull_back_measured(const Frame& f1, const Frame& f2, double x_ba
 void TsdaForce::add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const {
   const Span x = span(f1, f2);
   const Vector3d F = law.value(in.t, in.rho, x.l, x.ldot, in.scratch) * x.u;
-  load1.head<3>() += F;
-  load1.tail<3>() += s1.cross(f1.A.transpose() * F);
-  load2.head<3>() -= F;
-  load2.tail<3>() -= s2.cross(f2.A.transpose() * F);
+  add_force(f1, s1, F, load1);
+  add_force(f2, s2, Vector3d(-F), load2);
 }
 
 void TsdaForce::pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
@@ -69,39 +67,22 @@ void TsdaForce::pull_back(const ForceInputs& in, const Frame& f1, const Frame& f
   add_point(f1, s1, -1, slot1, d_bar, ddot_bar, eta_bar, bar1, theta_bar);
 }
 
-TsdaForce::At TsdaForce::at(const ForceInputs& in, const Frame& f1, const Frame& f2) const {
+Law::Value TsdaForce::at(const ForceInputs& in, const Frame& f1, const Frame& f2) const {
   const Span x = span(f1, f2);
-  return {x, law.derivatives(in.t, in.rho, x.l, x.ldot, in.scratch)};
+  return law.derivatives(in.t, in.rho, x.l, x.ldot, in.scratch);
 }
 
-void TsdaForce::tangent(const At& at, const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
-                        const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const {
-  const auto& [x, f] = at;
-  if (x.l == 0 && !is_k_times_d()) return;
-  Lanes<3> dd = t2.r + times(t2.A, s2) - t1.r - times(t1.A, s1);
-  Lanes<3> dddot = t2.rdot + times(t2.Adot, s2) - t1.rdot - times(t1.Adot, s1);
-  if (dir.s1) dd -= f1.A * *dir.s1, dddot -= f1.Adot * *dir.s1;
-  if (dir.s2) dd += f2.A * *dir.s2, dddot += f2.Adot * *dir.s2;
-  if (x.l == 0) {
-    const Lanes<3> dF = law.k * dd;
-    load1.topRows<3>() += dF;
-    load2.topRows<3>() -= dF;
-    load1.bottomRows<3>() += cross(s1, f1.A.transpose() * dF);
-    load2.bottomRows<3>() -= cross(s2, f2.A.transpose() * dF);
-    return;
-  }
-  const Lanes<1> dl = dot(x.u, dd);
-  const Lanes<3> du = (dd - x.u * dl) / x.l;
-  const Lanes<1> dldot = dot(x.ddot, du) + dot(x.u, dddot);
-  const Lanes<1> df = dir.f + (f.f_x * dl + f.f_xdot * dldot);
-  const Vector3d F = f.f * x.u;
-  const Lanes<3> dF = x.u * df + f.f * du;
-  load1.topRows<3>() += dF;
-  load2.topRows<3>() -= dF;
-  load1.bottomRows<3>() += cross(s1, transposed_times(t1.A, F) + f1.A.transpose() * dF);
-  load2.bottomRows<3>() -= cross(s2, transposed_times(t2.A, F) + f2.A.transpose() * dF);
-  if (dir.s1) load1.bottomRows<3>() -= cross(f1.A.transpose() * F, *dir.s1);
-  if (dir.s2) load2.bottomRows<3>() += cross(f2.A.transpose() * F, *dir.s2);
+void TsdaForce::tangent(const Law::Value& f, const Frame& f1, const Frame& f2, const FrameTangent& t1,
+                        const FrameTangent& t2, const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const {
+  const DualFrame g1{f1, t1}, g2{f2, t2};
+  const BodyVector v1{s1, dir.s1}, v2{s2, dir.s2};
+  const Jet<DualVector> d = separation(g1, g2, v1, v2);
+  const Jet<Dual> l = length(d);
+  if (l.x == 0 && !is_k_times_d()) return;
+  const Dual tension = dual(f.f, dir.f + f.f_x * lanes(l.x) + f.f_xdot * lanes(l.xd));
+  const DualVector F = l.x == 0 ? law.k * d.x : tension * direction(d.x, l.x);
+  add_force(g1, v1, F, load1);
+  add_force(g2, v2, -F, load2);
 }
 
 void TsdaForce::add_field_tangent(const ForceInputs& in, const ParameterBlock& block, const Frame& f1, const Frame& f2,
@@ -110,11 +91,12 @@ void TsdaForce::add_field_tangent(const ForceInputs& in, const ParameterBlock& b
   Lanes<3> s1_dir, s2_dir;
   dir.s1 = block.field<3>(slot1, s1_dir), dir.s2 = block.field<3>(slot2, s2_dir);
   if (!law.moves(block) && !dir.s1 && !dir.s2) return;
-  const At x = at(in, f1, f2);
+  const Law::Value f = at(in, f1, f2);
   Lanes<4> fields;
   dir.f = law.field_tangent(
-      {x.x.l, x.x.ldot}, block.field<4>(law.slot, fields), [&](int k) { return block.direction(k); }, in.scratch);
-  tangent(x, f1, f2, kStill, kStill, dir, load1, load2);
+      measured(in.angles, f1, f2), block.field<4>(law.slot, fields), [&](int k) { return block.direction(k); },
+      in.scratch);
+  tangent(f, f1, f2, kStill, kStill, dir, load1, load2);
 }
 
 double TsdaForce::potential(const Eigen::VectorXd&, const Frame& f1, const Frame& f2) const {

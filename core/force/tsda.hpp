@@ -41,17 +41,13 @@ struct TsdaForce {
   void pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
                  Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const;
 
-  struct At {
-    Span x;
-    Law::Value f;
-  };
   // Directions of the law (Law::field_tangent) and of the points; a null one is constant.
   struct FieldLanes {
     Lanes<1> f = Lanes<1>::Zero();
     const Lanes<3>*s1 = nullptr, *s2 = nullptr;
   };
-  At at(const ForceInputs& in, const Frame& f1, const Frame& f2) const;
-  void tangent(const At& at, const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
+  Law::Value at(const ForceInputs& in, const Frame& f1, const Frame& f2) const;
+  void tangent(const Law::Value& f, const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
                const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const;
   void add_field_tangent(const ForceInputs& in, const ParameterBlock& block, const Frame& f1, const Frame& f2,
                          Lanes<6>& load1, Lanes<6>& load2) const;

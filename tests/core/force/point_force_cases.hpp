@@ -44,7 +44,7 @@ struct TsdaCase : Bodies {
   }
   LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
     LawScratch<L> s(force.law, x, kLaw);
-    const TsdaForce::At now = force.at(s.inputs, f1, f2);
+    const Law::Value now = force.at(s.inputs, f1, f2);
     Lanes<4> fields = Lanes<4>::Zero();
     if (L::kFields > 0) fields = directions.middleRows(kLaw, 4);
     const Lanes<1> df = force.law.field_tangent(
