@@ -11,8 +11,7 @@
 
 namespace mbsopt {
 
-struct Angle {
-  static constexpr int kRows = 1;
+struct Angle : SingleRow<Angle> {
   static constexpr Displacements kDisplacements = Displacements::none;
   static constexpr RowQuantity quantity() { return RowQuantity::angle; }
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero(), s3 = Vector3d::Zero();  // n1, n2, a x n1 [-]
@@ -20,26 +19,12 @@ struct Angle {
   // The value of angle nearest to reference among those a full turn apart.
   static double on_branch(double angle, double reference);
 
-  void phi(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-  void phi_dot(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-  void phi_ddot(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-
-  void jacobian(const Frame& f1, const Frame& f2, Mat<1, 6>& J1, Mat<1, 6>& J2) const;
+  void phi(const Frame& f1, const Frame& f2, Vec<1>& out) const;  // without the atan2 of the other values
 
   void pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
                  GeometryBar& s) const;
-
-  void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
-               const GeometryTangent& s, const Vec<1>& lambda, PrimitiveTangent<1>& out) const;
-
- private:
-  Dot1 cosine() const { return {s1, s2}; }
-  Dot1 sine() const { return {s3, s2}; }
-  struct Jet {
-    double C, S, Cd, Sd, Cdd, Sdd, Ce, Se, D, N, E;  // N = C Sd - S Cd, E = C Cd + S Sd
-  };
-  Jet jet(const Frame& f1, const Frame& f2) const;
 };
+extern template struct SingleRow<Angle>;
 static_assert(IsPrimitive<Angle>);
 
 }  // namespace mbsopt

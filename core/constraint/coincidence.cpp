@@ -3,6 +3,18 @@
 #include "core/constraint/body_vector.hpp"
 
 namespace mbsopt {
+namespace {
+
+// Derivatives of xdd, x = A s, in p and pdot with omegadot held fixed. Both are values of N, since
+//   Addot = A(p) (skew(omegadot) - 2 (pdot'pdot)) + 2 A(pdot)
+struct VectorBlocks {
+  Mat<3, 4> xdd_p, xdd_pdot;
+  VectorBlocks(const BodyState& b, const Frame& f, const Vector3d& s)
+      : xdd_p(N(b.p, b.omegadot.cross(s) - 2 * b.pdot.squaredNorm() * s)),
+        xdd_pdot(2 * N(b.pdot, s) - 4 * (f.A * s) * b.pdot.transpose()) {}
+};
+
+}  // namespace
 
 void Coincidence::phi(const Frame& f1, const Frame& f2, Vec<3>& out) const { out = f2.point(s2) - f1.point(s1); }
 
@@ -21,19 +33,19 @@ void Coincidence::jacobian(const Frame& f1, const Frame& f2, Mat<3, 6>& J1, Mat<
 
 void Coincidence::pull_back(const Frame& f1, const Frame& f2, const Multipliers<3>& z, FrameBar& bar1, FrameBar& bar2,
                             GeometryBar& s) const {
-  const VectorJet d_bar(z.mu0, z.mu1, z.mu2, z.lambda);
+  const VectorJet d_bar{{z.mu0, z.mu1, z.mu2}, z.lambda};
   add_point_bar(f2, s2, d_bar, 1, bar2, s.s2);
   add_point_bar(f1, s1, d_bar, -1, bar1, s.s1);
 }
 
 void Coincidence::tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
                           const GeometryTangent& s, const Vec<3>& lambda, PrimitiveTangent<3>& out) const {
-  const VectorTangent d = separation_tangent(f1, f2, t1, t2, s1, s2, s);
-  out.phi = d.x, out.phi_dot = d.xd, out.phi_ddot = d.xdd;
-  out.load1.setZero(), out.load2.setZero();
-  const Lanes<3> none = Lanes<3>::Zero();
-  out.load1.bottomRows<3>() = -moment_tangent(f1, t1, s1, s.s1, lambda, none);
-  out.load2.bottomRows<3>() = moment_tangent(f2, t2, s2, s.s2, lambda, none);
+  const DualFrame g1{f1, t1}, g2{f2, t2};
+  const BodyVector v1{s1, s.s1}, v2{s2, s.s2};
+  const Jet<DualVector> d = separation(g1, g2, v1, v2);
+  out.phi = d.x.d, out.phi_dot = d.xd.d, out.phi_ddot = d.xdd.d;
+  out.load1 << Lanes<3>::Zero(), -moment(g1, v1, lambda).d;
+  out.load2 << Lanes<3>::Zero(), moment(g2, v2, lambda).d;
 }
 
 void Coincidence::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,

@@ -17,53 +17,22 @@ void product_rows(const VectorJet& y, const BodyState& b, const Vector3d& s, con
 
 }  // namespace
 
-void Dot1::phi(const Frame& f1, const Frame& f2, Vec<1>& out) const {
-  const Vector3d x = f1.A * s1, y = f2.A * s2;
-  out(0) = x.dot(y);
+template <class F, class S>
+EIGEN_ALWAYS_INLINE Row<VectorOf<F>> row_of(const Dot1&, const F& f1, const F& f2, const Vectors<S>& s) {
+  return product_row(f1, f2, s.s1, s.s2);
 }
-
-void Dot1::phi_dot(const Frame& f1, const Frame& f2, Vec<1>& out) const {
-  const Vector3d x = f1.A * s1, y = f2.A * s2, xd = f1.Adot * s1, yd = f2.Adot * s2;
-  out(0) = xd.dot(y) + x.dot(yd);
-}
-
-void Dot1::phi_ddot(const Frame& f1, const Frame& f2, Vec<1>& out) const {
-  const VectorJet x(f1, s1), y(f2, s2);
-  out(0) = x.xdd.dot(y.x) + 2 * x.xd.dot(y.xd) + x.x.dot(y.xdd);
-}
-
-double Dot1::change(const Frame& f1, const Frame& f2) const {
-  const Vector3d x = f1.A * s1, y = f2.A * s2, x_eta = f1.A_eta * s1, y_eta = f2.A_eta * s2;
-  return x_eta.dot(y) + x.dot(y_eta);
-}
-
-void Dot1::jacobian(const Frame& f1, const Frame& f2, Mat<1, 6>& J1, Mat<1, 6>& J2) const {
-  const Vector3d x = f1.A * s1, y = f2.A * s2;
-  J1.leftCols<3>().setZero(), J2.leftCols<3>().setZero();
-  J1.rightCols<3>() = s1.cross(f1.A.transpose() * y).transpose();
-  J2.rightCols<3>() = s2.cross(f2.A.transpose() * x).transpose();
-}
+template struct SingleRow<Dot1>;
 
 void Dot1::pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
                      GeometryBar& s) const {
-  const VectorJet x(f1, s1), y(f2, s2);
+  const VectorJet x = vector_of(f1, s1), y = vector_of(f2, s2);
   add_vector_bar(f1, s1, product_bar(y, z), 1, bar1, s.s1);
   add_vector_bar(f2, s2, product_bar(x, z), 1, bar2, s.s2);
 }
 
-void Dot1::tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
-                   const GeometryTangent& s, const Vec<1>& lambda, PrimitiveTangent<1>& out) const {
-  const VectorJet x(f1, s1), y(f2, s2);
-  const VectorTangent dx(f1, t1, s1, s.s1), dy(f2, t2, s2, s.s2);
-  product_tangent(x, y, dx, dy, out);
-  out.load1.setZero(), out.load2.setZero();
-  out.load1.bottomRows<3>() = lambda(0) * moment_tangent(f1, t1, s1, s.s1, y.x, dy.x);
-  out.load2.bottomRows<3>() = lambda(0) * moment_tangent(f2, t2, s2, s.s2, x.x, dx.x);
-}
-
 void Dot1::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,
                           const Vec<1>& lambda, TurningBlocks<1>& out) const {
-  const VectorJet x(f1, s1), y(f2, s2);
+  const VectorJet x = vector_of(f1, s1), y = vector_of(f2, s2);
   product_rows(y, b1, s1, x.x, out.p1, out.pdot1);
   product_rows(x, b2, s2, y.x, out.p2, out.pdot2);
   const Matrix3d S1 = lambda(0) * skew(s1), S2 = lambda(0) * skew(s2);

@@ -6,32 +6,22 @@
 // Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), section 9.4 (dot-1).
 #pragma once
 
-#include "core/constraint/primitive.hpp"
+#include "core/constraint/single_row.hpp"
 
 namespace mbsopt {
 
-struct Dot1 {
-  static constexpr int kRows = 1;
+struct Dot1 : SingleRow<Dot1> {
   static constexpr Displacements kDisplacements = Displacements::none;
   static constexpr RowQuantity quantity() { return RowQuantity::cosine; }
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();  // the two vectors, each in its body's axes [-]
 
-  void phi(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-  void phi_dot(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-  void phi_ddot(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-  double change(const Frame& f1, const Frame& f2) const;  // under the frames' virtual displacement
-
-  void jacobian(const Frame& f1, const Frame& f2, Mat<1, 6>& J1, Mat<1, 6>& J2) const;
-
   void pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
                  GeometryBar& s) const;
-
-  void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
-               const GeometryTangent& s, const Vec<1>& lambda, PrimitiveTangent<1>& out) const;
 
   void turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2, const Vec<1>& lambda,
                       TurningBlocks<1>& out) const;
 };
+extern template struct SingleRow<Dot1>;
 static_assert(IsPrimitive<Dot1> && HasTurningBlocks<Dot1>);
 
 }  // namespace mbsopt

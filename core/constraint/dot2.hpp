@@ -6,29 +6,20 @@
 // joint's displacement. Haug (1989), section 9.4 (dot-2).
 #pragma once
 
-#include "core/constraint/primitive.hpp"
+#include "core/constraint/single_row.hpp"
 
 namespace mbsopt {
 
-struct Dot2 {
-  static constexpr int kRows = 1;
+struct Dot2 : SingleRow<Dot2> {
   static constexpr Displacements kDisplacements = Displacements::any;
   static constexpr RowQuantity quantity() { return RowQuantity::length; }
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();  // the points from each centre of mass, body axes [m]
   Vector3d s3 = Vector3d::Zero();                         // the direction, axes of body 1 [-]
 
-  void phi(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-  void phi_dot(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-  void phi_ddot(const Frame& f1, const Frame& f2, Vec<1>& out) const;
-
-  void jacobian(const Frame& f1, const Frame& f2, Mat<1, 6>& J1, Mat<1, 6>& J2) const;
-
   void pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
                  GeometryBar& s) const;
-
-  void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
-               const GeometryTangent& s, const Vec<1>& lambda, PrimitiveTangent<1>& out) const;
 };
+extern template struct SingleRow<Dot2>;
 static_assert(IsPrimitive<Dot2>);
 
 }  // namespace mbsopt

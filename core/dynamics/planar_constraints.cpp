@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/body/jet.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/linear/pairs.hpp"
 
@@ -17,22 +18,9 @@ struct Vectors {
   Complex<S> s1, s2, s3;
 };
 
-// A number or a vector along the motion, with its time derivatives.
 template <class X>
-struct Jet {
-  X x{}, xd{}, xdd{};
-
-  const X& of(Order order) const { return order == Order::phi ? x : order == Order::phi_dot ? xd : xdd; }
-};
-template <class T>
-Jet<T> dot(const Jet<Complex<T>>& a, const Jet<Complex<T>>& b) {
-  return {dot(a.x, b.x), dot(a.xd, b.x) + dot(a.x, b.xd), dot(a.xdd, b.x) + 2 * dot(a.xd, b.xd) + dot(a.x, b.xdd)};
-}
-template <class T>
-Jet<T> length(const Jet<Complex<T>>& d) {
-  using std::sqrt;
-  const T l = sqrt(squared_norm(d.x)), ldot = dot(d.x, d.xd) / l;
-  return {l, ldot, T(dot(d.x, d.xdd) + squared_norm(d.xd) - ldot * ldot) / l};
+const X& of(Order order, const Jet<X>& jet) {
+  return order == Order::phi ? jet.x : order == Order::phi_dot ? jet.xd : jet.xdd;
 }
 
 // A body-fixed vector x = A s, and the separation of two points.
@@ -65,13 +53,13 @@ T phi_of(Order order, const PlanarConstraint& c, const PlanarFrame<T>& f1, const
          const Vectors<S>& s) {
   switch (c.kind) {
     case Kind::dot1:
-      return dot(vector_of(f1, s.s1), vector_of(f2, s.s2)).of(order);
+      return of(order, product(vector_of(f1, s.s1), vector_of(f2, s.s2)));
     case Kind::dot2:
-      return dot(vector_of(f1, s.s3), separation(f1, f2, s)).of(order);
+      return of(order, product(vector_of(f1, s.s3), separation(f1, f2, s)));
     case Kind::distance:
-      return length(separation(f1, f2, s)).of(order);
+      return of(order, length(separation(f1, f2, s)));
     case Kind::angle:
-      return c.sign * angle_between(order, f1, f2, s).of(order);
+      return c.sign * of(order, angle_between(order, f1, f2, s));
     case Kind::point:
       break;
   }
@@ -227,7 +215,7 @@ void PlanarConstraints::evaluate(const Frames& frames, Branch&& branch, Eigen::V
   for (const PlanarConstraint& c : model_->constraints) {
     const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
     if (c.kind == Kind::point) {
-      const Plane d = separation(f1, f2, vectors(c)).of(order);
+      const Plane d = of(order, separation(f1, f2, vectors(c)));
       out(c.row) = d.re, out(c.row2) = d.im;
     } else {
       out(c.row) += c.factor * branch(c, phi_of(order, c, f1, f2, vectors(c)));
@@ -303,7 +291,7 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
     };
     const auto add = [&](const auto& s) {
       if (c.kind == Kind::point) {
-        const PlaneDual d = separation(f1, f2, s).of(order);
+        const PlaneDual d = of(order, separation(f1, f2, s));
         rows.row(c.row) += lanes(d.re);
         rows.row(c.row2) += lanes(d.im);
         const Plane l{lambda(c.row), lambda(c.row2)};
