@@ -37,59 +37,6 @@ struct __attribute__((may_alias)) Row {
 using Two __attribute__((aligned(8), may_alias)) = double __attribute__((vector_size(16)));
 static_assert(alignof(Two) == 8);
 
-class Six {
- public:
-  explicit Six(const double* from)
-      : a_(*reinterpret_cast<const Four*>(from)), b_(*reinterpret_cast<const Two*>(from + 4)) {}
-  static Six zero() { return Six(Four{}, Two{}); }
-  void add(double s, const double* y) { *this = Six(a_ + s * four(y), b_ + s * two(y)); }
-  void subtract(double s, const double* y) { *this = Six(a_ - s * four(y), b_ - s * two(y)); }
-  void scale(double s) { a_ *= s, b_ *= s; }
-  friend Six operator*(const Six& x, const Six& y) { return Six(x.a_ * y.a_, x.b_ * y.b_); }
-  Six& operator+=(const Six& y) { return a_ += y.a_, b_ += y.b_, *this; }
-  Six& operator-=(const Six& y) { return a_ -= y.a_, b_ -= y.b_, *this; }
-  // Sets each entry to the larger of itself and |y|.
-  void grow_to(const Six& y) {
-    const Four a = y.a_ < 0 ? -y.a_ : y.a_;
-    const Two b = y.b_ < 0 ? -y.b_ : y.b_;
-    a_ = a_ > a ? a_ : a, b_ = b_ > b ? b_ : b;
-  }
-  double largest() const {
-    double size = b_[0] > b_[1] ? b_[0] : b_[1];
-    for (int i = 0; i < 4; ++i) size = size > a_[i] ? size : a_[i];
-    return size;
-  }
-  // The products with one, two, six columns of six.
-  double times(const double* y) const {
-    const Four p = a_ * four(y);
-    const Two sum = __builtin_shufflevector(p, p, 0, 1) + __builtin_shufflevector(p, p, 2, 3) + b_ * two(y);
-    return sum[0] + sum[1];
-  }
-  Two times_two(const double* M) const {
-    const Four p = a_ * four(M), q = a_ * four(M + 6);
-    const Two r = b_ * two(M), s = b_ * two(M + 6);
-    const Four sums = __builtin_shufflevector(p, q, 0, 4, 2, 6) + __builtin_shufflevector(p, q, 1, 5, 3, 7);
-    return __builtin_shufflevector(sums, sums, 0, 1) + __builtin_shufflevector(sums, sums, 2, 3) +
-           (__builtin_shufflevector(r, s, 0, 2) + __builtin_shufflevector(r, s, 1, 3));
-  }
-  Six times_columns(const double* M) const {
-    const Two x = times_two(M), y = times_two(M + 12), z = times_two(M + 24);
-    return Six(__builtin_shufflevector(x, y, 0, 1, 2, 3), z);
-  }
-  void store(double* to) const {
-    *reinterpret_cast<Four*>(to) = a_;
-    *reinterpret_cast<Two*>(to + 4) = b_;
-  }
-
- private:
-  Six(Four a, Two b) : a_(a), b_(b) {}
-  static Four four(const double* y) { return *reinterpret_cast<const Four*>(y); }
-  static Two two(const double* y) { return *reinterpret_cast<const Two*>(y + 4); }
-
-  Four a_;
-  Two b_;
-};
-
 // M numbers: fours, and a pair where they leave one.
 template <int M>
 class ColumnOfFours {
@@ -101,6 +48,8 @@ class ColumnOfFours {
     for (int i = 0; i < kFours; ++i) x_[i] = four(from, i);
     if constexpr (kPair) rest_ = pair(from);
   }
+  static ColumnOfFours zero() { return ColumnOfFours(); }
+  void add(double s, const double* y) { subtract(-s, y); }
   void subtract(double s, const double* y) {
 #pragma GCC unroll 8
     for (int i = 0; i < kFours; ++i) x_[i] -= s * four(y, i);
@@ -131,12 +80,13 @@ class ColumnOfFours {
   }
 
  private:
+  ColumnOfFours() = default;
   static constexpr int kFours = M / 4;
   static constexpr bool kPair = M % 4 != 0;
   static Four four(const double* y, int i) { return reinterpret_cast<const Four*>(y)[i]; }
   static Two pair(const double* y) { return *reinterpret_cast<const Two*>(y + M - 2); }
 
-  Four x_[kFours];
+  Four x_[kFours] = {};
   Two rest_ = {};
 };
 
@@ -148,7 +98,7 @@ const LuKernelTable* avx2_lu_kernels() {
 }
 
 const BlockKernels* avx2_block_kernels() {
-  static constexpr BlockKernels kKernels = BlockLoops<Row, Six>::kernels();
+  static constexpr BlockKernels kKernels = BlockLoops<Row, ColumnOfFours>::kernels();
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &kKernels : nullptr;
 }
 #else

@@ -1,6 +1,6 @@
 // The table of kernel_table.hpp, from the loops over rows (row_loops.hpp), over blocks of six (loops_of_six.hpp) and
-// over blocks of motion. It takes two types of registers: Row, kLanes numbers, and Six, a column of a block. Only the
-// two files that compile the table include this header.
+// over blocks of motion. It takes two types of registers: Row, kLanes numbers, and ColumnOf<M>, M numbers of a block's
+// column. Only the two files that compile the table include this header.
 #pragma once
 
 #include "core/linear/kernel_table.hpp"
@@ -10,15 +10,17 @@
 namespace mbsopt {
 namespace {  // of each file its own: compiled for different processors
 
-template <class Row, class Six>
+template <class Row, template <int> class ColumnOf>
 class BlockLoops {
+  using OfSix = LoopsOfSix<ColumnOf<6>>;
+
  public:
   static constexpr BlockKernels kernels() {
-    return {.factor_diagonal = &LoopsOfSix<Six>::factor_diagonal,
-            .divide = &LoopsOfSix<Six>::divide,
-            .subtract_product = &LoopsOfSix<Six>::subtract_product,
-            .add_weighted_squares = &LoopsOfSix<Six>::add_weighted_squares,
-            .in_space = LoopsOfSix<Six>::row_kernels(),
+    return {.factor_diagonal = &OfSix::factor_diagonal,
+            .divide = &OfSix::divide,
+            .subtract_product = &OfSix::subtract_product,
+            .add_weighted_squares = &OfSix::add_weighted_squares,
+            .in_space = RowLoops<One>::template kernels<RowsInSpace>(),
             .in_plane = RowLoops<One>::template kernels<RowsInPlane>(),
             .lanes_in_space = RowLoops<Row>::template kernels<RowsInSpace>(),
             .lanes_in_plane = RowLoops<Row>::template kernels<RowsInPlane>(),

@@ -54,9 +54,6 @@ const LaneRow* entries(const Lanes<N>& x) {
   return reinterpret_cast<const LaneRow*>(x.data());
 }
 
-// (a0 + a1, b0 + b1)
-inline Pair sums(Pair a, Pair b) { return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3); }
-
 // A column of 2 Pairs numbers.
 template <int Pairs>
 struct Column {

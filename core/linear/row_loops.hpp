@@ -69,13 +69,17 @@ class RowLoops {
   }
   template <int N>
   static void subtract_times(const double* L, const Row* x, Row* y) {
+    Row sum[N];
 #pragma GCC unroll 6
-    for (int i = 0; i < N; ++i) {
-      Row sum = y[i];
+    for (int i = 0; i < N; ++i) sum[i] = y[i];
 #pragma GCC unroll 6
-      for (int j = 0; j < N; ++j) sum -= L[i + N * j] * x[j];
-      y[i] = sum;
+    for (int j = 0; j < N; ++j) {
+      const Row xj = x[j];
+#pragma GCC unroll 6
+      for (int i = 0; i < N; ++i) sum[i] -= L[i + N * j] * xj;
     }
+#pragma GCC unroll 6
+    for (int i = 0; i < N; ++i) y[i] = sum[i];
   }
   template <int N>
   static void subtract_transposed_times(const double* L, const Row* x, Row* y) {
