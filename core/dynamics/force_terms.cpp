@@ -6,6 +6,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
 #include "core/mechanism/derivative_blocks.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 
 namespace mbsopt {
 namespace {

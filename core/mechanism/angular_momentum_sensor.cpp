@@ -5,8 +5,8 @@
 //   m: z'(r x rdot)   J: z_B omega'
 #include "core/body/euler_parameters.hpp"
 #include "core/body/inertia.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
@@ -23,13 +23,9 @@ struct AngularMomentumSensor final : SensorFunction {
     }
     return L;
   }
-  double value(const MechanismData& d, const StatePoint& at) const override {
-    return component_value(momentum(d, at.y), component);
-  }
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
     const Vector3d L = momentum(d, at.y), z = component_gradient(L, component);
-    for (int i = 1; i <= d.n; ++i) {
+    for (int i = 1; i <= d.n && to; ++i) {
       const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
       const BodyAt b = body_at(at.y, i);
       const Frame& f = b.frame;
@@ -41,18 +37,13 @@ struct AngularMomentumSensor final : SensorFunction {
       bar.A = z * (body.J * omega).transpose();
       bar.p = -2 * G_transposed_times(b.state.pdot, omega_bar);
       bar.pdot = 2 * G_transposed_times(b.state.p, omega_bar);
-      add_pull_back(b, i, bar, scale, y_bar);
-      add_slot<1>(d, body.slot_mass, Vec<1>(z.dot(f.r.cross(f.rdot))), scale, rho_bar);
-      add_slot<6>(d, body.slot_J, inertia_gradient(z_B * omega.transpose()), scale, rho_bar);
+      to->add_frame(b, i, bar);
+      to->add_slot<1>(body.slot_mass, Vec<1>(z.dot(f.r.cross(f.rdot))));
+      to->add_slot<6>(body.slot_J, inertia_gradient(z_B * omega.transpose()));
     }
     return component_value(L, component);
   }
-  std::vector<SensorPtr> components() const override {
-    std::vector<SensorPtr> all;
-    for (int k = 0; k < 3 && component == kNorm; ++k)
-      all.push_back(changed(*this, [&](AngularMomentumSensor& c) { c.component = k; }));
-    return all;
-  }
+  std::vector<SensorPtr> components() const override { return components_of_norm(*this); }
 };
 
 }  // namespace

@@ -7,62 +7,57 @@
 #include "core/body/inertia.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
 
-void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, double scale, VecOut y_bar,
-                          VecOut rho_bar) {
+void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, SensorGradient& to) {
   const StateLayout layout{d.n};
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
     const BodyAt b = body_at(y, i);
     const Vector3d w = b.state.omega(), w_bar = body.J * w;
-    y_bar.segment<3>(layout.v(i)) += scale * body.mass * b.frame.rdot;
+    to.y_bar.segment<3>(layout.v(i)) += to.scale * body.mass * b.frame.rdot;
     // w = 2 G(p) pdot = -2 G(pdot) p
-    y_bar.segment<4>(layout.pdot(i)) += 2 * scale * G_transposed_times(b.state.p, w_bar);
-    y_bar.segment<4>(layout.p(i)) -= 2 * scale * G_transposed_times(b.state.pdot, w_bar);
-    add_slot<1>(d, body.slot_mass, Vec<1>(0.5 * b.frame.rdot.squaredNorm()), scale, rho_bar);
-    add_slot<6>(d, body.slot_J, inertia_gradient(0.5 * w * w.transpose()), scale, rho_bar);
+    to.y_bar.segment<4>(layout.pdot(i)) += 2 * to.scale * G_transposed_times(b.state.p, w_bar);
+    to.y_bar.segment<4>(layout.p(i)) -= 2 * to.scale * G_transposed_times(b.state.pdot, w_bar);
+    to.add_slot<1>(body.slot_mass, Vec<1>(0.5 * b.frame.rdot.squaredNorm()));
+    to.add_slot<6>(body.slot_J, inertia_gradient(0.5 * w * w.transpose()));
   }
 }
 
 void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
-                            double scale, VecOut y_bar, VecOut rho_bar) {
+                            SensorGradient& to) {
   const StateLayout layout{d.n};
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
     const Vector3d r = y.segment<3>(layout.q(i));
-    y_bar.segment<3>(layout.q(i)) -= scale * body.mass * d.gravity;
-    add_slot<1>(d, body.slot_mass, Vec<1>(-d.gravity.dot(r)), scale, rho_bar);
-    add_slot<3>(d, d.slot_gravity, Vec<3>(-body.mass * r), scale, rho_bar);
+    to.y_bar.segment<3>(layout.q(i)) -= to.scale * body.mass * d.gravity;
+    to.add_slot<1>(body.slot_mass, Vec<1>(-d.gravity.dot(r)));
+    to.add_slot<3>(d.slot_gravity, Vec<3>(-body.mass * r));
   }
-  FieldGradient fields{d.theta_rho, d.active, scale, rho_bar};
+  FieldGradient fields = to.fields();
   d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
     const BodyAt b1 = body_at(y, i), b2 = body_at(y, j);
     FrameBar bar1, bar2;
     bar1.set_zero(), bar2.set_zero();
     f.pull_back_potential(angles, b1.frame, b2.frame, bar1, bar2, fields);
-    add_pull_back(b1, i, bar1, scale, y_bar);
-    add_pull_back(b2, j, bar2, scale, y_bar);
+    to.add_frame(b1, i, bar1);
+    to.add_frame(b2, j, bar2);
   });
 }
 
 struct EnergyFunction final : SensorFunction {
   bool kinetic = true, potential = true;
 
-  double value(const MechanismData& d, const StatePoint& at) const override {
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
+    if (to && kinetic) add_kinetic_gradient(d, at.y, *to);
+    if (to && potential) add_potential_gradient(d, at.y, at.angles, *to);
     const Energy e = energy(d, at.y, at.angles);
     return (kinetic ? e.kinetic : 0) + (potential ? e.potential : 0);
-  }
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
-    if (kinetic) add_kinetic_gradient(d, at.y, scale, y_bar, rho_bar);
-    if (potential) add_potential_gradient(d, at.y, at.angles, scale, y_bar, rho_bar);
-    return value(d, at);
   }
 };
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/scene/scene_facts.hpp"
 
@@ -42,22 +43,28 @@ struct ExpressionSensor final : SensorFunction {
   std::vector<Below> below;
   bool is_rate = false;
 
-  double value(const MechanismData& d, const StatePoint& at) const override {
-    Scratch& s = evaluated(d, at);
-    if (!is_rate) return program.value(span(s.x), s.program);
-    return add_rate_gradient(s);
-  }
-
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
-    Scratch& s = evaluated(d, at);
-    const double result = is_rate ? add_rate_gradient(s) : program.add_gradient(span(s.x), 1, span(s.x_bar), s.program);
-    for (const int k : d.active) rho_bar(k) += scale * s.x_bar[static_cast<std::size_t>(k)];
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
+    Scratch& s = scratch_of_this_thread().grown(program, inputs);
+    for (std::vector<double>* numbers : {&s.xdot, &s.x_bar, &s.xdot_bar}) std::fill_n(numbers->begin(), inputs, 0.0);
+    for (const std::size_t k : parameters) s.x[k] = d.rho(static_cast<Eigen::Index>(k));
+    s.x[time] = at.t;
+    for (const Below& b : below) {
+      s.x[b.input] = b.sensor->evaluate(d, at, nullptr);
+      if (is_rate) s.xdot[b.input] = b.rate->evaluate(d, at, nullptr);
+    }
+    if (!to && !is_rate) return program.value(span(s.x), s.program);
+    const double result =
+        is_rate ? program.add_gradient_tangent(span(s.x), span(s.xdot), 1, span(s.xdot_bar), span(s.x_bar), s.program)
+                : program.add_gradient(span(s.x), 1, span(s.x_bar), s.program);
+    if (!to) return result;
+    for (const int k : d.active) to->rho_bar(k) += to->scale * s.x_bar[static_cast<std::size_t>(k)];
+    const auto add = [&](const SensorPtr& sensor, double weight) {
+      SensorGradient part{d, to->scale * weight, to->y_bar, to->rho_bar};
+      if (part.scale != 0) sensor->evaluate(d, at, &part);
+    };
     for (const auto& [input, sensor, rate] : below) {
-      if (const double weight = scale * s.x_bar[input]; weight != 0)
-        sensor->add_gradient(d, at, weight, y_bar, rho_bar);
-      if (const double weight = scale * s.xdot_bar[input]; is_rate && weight != 0)
-        rate->add_gradient(d, at, weight, y_bar, rho_bar);
+      add(sensor, s.x_bar[input]);
+      if (is_rate) add(rate, s.xdot_bar[input]);
     }
     return result;
   }
@@ -82,24 +89,6 @@ struct ExpressionSensor final : SensorFunction {
 
  private:
   std::span<double> span(std::vector<double>& x) const { return {x.data(), inputs}; }
-
-  // Computes the inputs and their rates, but no gradients.
-  Scratch& evaluated(const MechanismData& d, const StatePoint& at) const {
-    Scratch& s = scratch_of_this_thread().grown(program, inputs);
-    for (std::vector<double>* numbers : {&s.xdot, &s.x_bar, &s.xdot_bar}) std::fill_n(numbers->begin(), inputs, 0.0);
-    for (const std::size_t k : parameters) s.x[k] = d.rho(static_cast<Eigen::Index>(k));
-    s.x[time] = at.t;
-    for (const Below& b : below) {
-      s.x[b.input] = b.sensor->value(d, at);
-      if (is_rate) s.xdot[b.input] = b.rate->value(d, at);
-    }
-    return s;
-  }
-
-  // Returns edot, the tangent of e along xdot.
-  double add_rate_gradient(Scratch& s) const {
-    return program.add_gradient_tangent(span(s.x), span(s.xdot), 1, span(s.xdot_bar), span(s.x_bar), s.program);
-  }
 };
 
 }  // namespace

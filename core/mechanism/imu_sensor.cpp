@@ -18,23 +18,18 @@ struct SpecificForceSensor final : SensorFunction {
   BodyPoint point;
   MountAxis axis;
 
-  double value(const MechanismData& d, const StatePoint& at) const override {
-    const BodyAt b = moving(at, point.body);
-    return (b.frame.A * axis.m).dot(b.frame.point_ddot(point.s) - d.gravity);
-  }
-
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
     const BodyAt b = moving(at, point.body);
     const Vector3d W = b.frame.point_ddot(point.s) - d.gravity, along = b.frame.A * axis.m;
+    if (!to) return along.dot(W);
     FrameBar bar;
     bar.set_zero();
     bar.A = W * axis.m.transpose();
-    add_pull_back(b, point.body, bar, scale, y_bar);
-    add_slot<3>(d, axis.slot, Vec<3>(b.frame.A.transpose() * W), scale, rho_bar);
-    add_slot<3>(d, d.slot_gravity, Vec<3>(-along), scale, rho_bar);
-    add_acceleration(d, at, point, along, scale, y_bar, rho_bar);
-    at.motion->fold_bar(at, y_bar, rho_bar);
+    to->add_frame(b, point.body, bar);
+    to->add_slot<3>(axis.slot, Vec<3>(b.frame.A.transpose() * W));
+    to->add_slot<3>(d.slot_gravity, Vec<3>(-along));
+    add_acceleration(at, point, along, *to);
+    at.motion->fold_bar(at, to->y_bar, to->rho_bar);
     return along.dot(W);
   }
 };
@@ -43,19 +38,14 @@ struct MountRateSensor final : SensorFunction {
   int body = 0;
   MountAxis axis;
 
-  double value(const MechanismData&, const StatePoint& at) const override {
-    return axis.m.dot(body_at(at.y, body).state.omega());
-  }
-
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
     const BodyAt b = body_at(at.y, body);
     const Vector3d omega = b.state.omega();
-    add_slot<3>(d, axis.slot, Vec<3>(omega), scale, rho_bar);
-    if (body > 0) {  // omega_B = 2 G(p) pdot = -2 G(pdot) p
+    if (to) to->add_slot<3>(axis.slot, Vec<3>(omega));
+    if (to && body > 0) {  // omega_B = 2 G(p) pdot = -2 G(pdot) p
       const StateLayout layout{d.n};
-      y_bar.segment<4>(layout.pdot(body)) += 2 * scale * G_transposed_times(b.state.p, axis.m);
-      y_bar.segment<4>(layout.p(body)) -= 2 * scale * G_transposed_times(b.state.pdot, axis.m);
+      to->y_bar.segment<4>(layout.pdot(body)) += 2 * to->scale * G_transposed_times(b.state.p, axis.m);
+      to->y_bar.segment<4>(layout.p(body)) -= 2 * to->scale * G_transposed_times(b.state.pdot, axis.m);
     }
     return axis.m.dot(omega);
   }

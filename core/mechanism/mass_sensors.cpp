@@ -2,6 +2,7 @@
 //   M = sum of m_i     X = sum of m_i r_i / M   [m]     P = sum of m_i rdot_i   [kg m/s]
 //   dX/dm_i = (r_i - X)/M              dP/dm_i = rdot_i
 #include "core/body/state_layout.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 
 namespace mbsopt {
@@ -18,17 +19,13 @@ struct MassFunction final : SensorFunction {
     for (int i = 1; i <= d.n; ++i) X += mass(d, i) * y.segment<3>(index(d, i));
     return mean ? Vector3d(X / total_mass(d)) : X;
   }
-  double value(const MechanismData& d, const StatePoint& at) const override {
-    return component_value(sum(d, at.y), component);
-  }
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
     const Vector3d X = sum(d, at.y), origin = mean ? X : Vector3d(Vector3d::Zero());
-    const Vector3d X_bar = (mean ? scale / total_mass(d) : scale) * component_gradient(X, component);
-    for (int i = 1; i <= d.n; ++i) {
-      y_bar.segment<3>(index(d, i)) += mass(d, i) * X_bar;
+    const Vector3d X_bar = component_gradient(X, component) / (mean ? total_mass(d) : 1);
+    for (int i = 1; i <= d.n && to; ++i) {
+      to->y_bar.segment<3>(index(d, i)) += to->scale * mass(d, i) * X_bar;
       const Vector3d x = at.y.segment<3>(index(d, i));
-      add_slot<1>(d, d.bodies[static_cast<std::size_t>(i)].slot_mass, Vec<1>(X_bar.dot(x - origin)), 1, rho_bar);
+      to->add_slot<1>(d.bodies[static_cast<std::size_t>(i)].slot_mass, Vec<1>(X_bar.dot(x - origin)));
     }
     return component_value(X, component);
   }
@@ -37,10 +34,7 @@ struct MassFunction final : SensorFunction {
     return changed(*this, [](MassFunction& r) { r.of_velocities = true; });
   }
   std::vector<SensorPtr> components() const override {
-    std::vector<SensorPtr> all;
-    for (int k = 0; k < 3 && of_velocities && component == kNorm; ++k)
-      all.push_back(changed(*this, [&](MassFunction& c) { c.component = k; }));
-    return all;
+    return of_velocities ? components_of_norm(*this) : std::vector<SensorPtr>();
   }
 
   static double mass(const MechanismData& d, int i) { return d.bodies[static_cast<std::size_t>(i)].mass; }

@@ -5,6 +5,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/mechanism/compile.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/state_point.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -27,12 +28,13 @@ int Mechanism::sensor(const std::string& name) const {
 }
 
 double Mechanism::sensor_value(int sensor, const StatePoint& at) const {
-  return data_->sensors[static_cast<std::size_t>(sensor)]->value(*data_, at);
+  return data_->sensors[static_cast<std::size_t>(sensor)]->evaluate(*data_, at, nullptr);
 }
 
 double Mechanism::add_sensor_gradient(int sensor, const StatePoint& at, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
                                       Eigen::Ref<Eigen::VectorXd> rho_bar) const {
-  return data_->sensors[static_cast<std::size_t>(sensor)]->add_gradient(*data_, at, scale, y_bar, rho_bar);
+  SensorGradient to{*data_, scale, y_bar, rho_bar};
+  return data_->sensors[static_cast<std::size_t>(sensor)]->evaluate(*data_, at, &to);
 }
 
 Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, const StatePoint& at) {

@@ -126,13 +126,6 @@ struct MechanismData {
   }
 };
 
-// rho_bar (all parameters) += scale (d slot/d rho)' bar, for one field
-template <int N>
-void add_slot(const MechanismData& data, int slot, const Vec<N>& bar, double scale,
-              Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  FieldGradient{data.theta_rho, data.active, scale, rho_bar}.add<N>(slot, bar);
-}
-
 struct Energy {
   double kinetic = 0, potential = 0;
 };

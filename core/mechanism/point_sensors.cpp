@@ -15,21 +15,20 @@ BodyAt moving(const StatePoint& at, int body) {
   return b;
 }
 
-void add_acceleration(const MechanismData& d, const StatePoint& at, const BodyPoint& point, const Vector3d& X,
-                      double scale, VecOut y_bar, VecOut rho_bar) {
+void add_acceleration(const StatePoint& at, const BodyPoint& point, const Vector3d& X, SensorGradient& to) {
   const BodyAt b = moving(at, point.body);
-  add_slot<3>(d, point.slot, Vec<3>(b.frame.Addot.transpose() * X), scale, rho_bar);
+  to.add_slot<3>(point.slot, Vec<3>(b.frame.Addot.transpose() * X));
   if (point.body == 0) return;
   FrameBar bar;
   bar.set_zero();
-  bar.Addot = scale * X * point.s.transpose();
-  const StateLayout layout{d.n};
-  add_pull_back(b.state, bar, Vector4d::Zero(), Vector3d::Zero(), y_bar.segment<7>(layout.q(point.body)),
-                y_bar.segment<7>(layout.v(point.body)));
+  bar.Addot = to.scale * X * point.s.transpose();
+  const StateLayout layout{to.data.n};
+  add_pull_back(b.state, bar, Vector4d::Zero(), Vector3d::Zero(), to.y_bar.segment<7>(layout.q(point.body)),
+                to.y_bar.segment<7>(layout.v(point.body)));
   // X'A (omegadot x s) = omegadot'(s x A'X)
   Vec<6>& out = at.motion->bar().z[static_cast<std::size_t>(point.body - 1)];
-  out.head<3>() += scale * X;
-  out.tail<3>() += scale * point.s.cross(b.frame.A.transpose() * X);
+  out.head<3>() += to.scale * X;
+  out.tail<3>() += to.scale * point.s.cross(b.frame.A.transpose() * X);
 }
 
 BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where) {
@@ -39,15 +38,14 @@ BodyPoint sensor_point(Compilation& model, const std::string& body, const PointF
   return result;
 }
 
-void add_point(const MechanismData& d, const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar,
-               const Vector3d& V_bar, double scale, VecOut y_bar, VecOut rho_bar) {
+void add_point(const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar, const Vector3d& V_bar,
+               SensorGradient& to) {
   FrameBar bar;
   bar.set_zero();
   bar.r = X_bar, bar.rdot = V_bar;
   bar.A = X_bar * point.s.transpose(), bar.Adot = V_bar * point.s.transpose();
-  add_pull_back(body, point.body, bar, scale, y_bar);
-  const Vec<3> s_bar = body.frame.A.transpose() * X_bar + body.frame.Adot.transpose() * V_bar;
-  add_slot<3>(d, point.slot, s_bar, scale, rho_bar);
+  to.add_frame(body, point.body, bar);
+  to.add_slot<3>(point.slot, Vec<3>(body.frame.A.transpose() * X_bar + body.frame.Adot.transpose() * V_bar));
 }
 
 namespace {
@@ -75,60 +73,39 @@ Vector3d place(const BodyPoint& point, const Eigen::VectorXd& y) {
   return b.r + (b.e0 * b.e0 - b.e.squaredNorm()) * s + (2 * b.e.dot(s)) * b.e + (2 * b.e0) * b.e.cross(s);
 }
 
-void add_place_bar(const MechanismData& d, const BodyPoint& point, const Eigen::VectorXd& y, const Vector3d& X_bar,
-                   VecOut y_bar, VecOut rho_bar) {
-  if (point.body == 0) return add_slot<3>(d, point.slot, X_bar, 1, rho_bar);
+void add_place(const BodyPoint& point, const Eigen::VectorXd& y, const Vector3d& X_bar, SensorGradient& to) {
+  if (point.body == 0) return to.add_slot<3>(point.slot, X_bar);
   const Placed b(y, point.body);
   const Vector3d &s = point.s, e_s = b.e.cross(s);
   const double along = s.dot(X_bar), e_X = b.e.dot(X_bar);
-  double* q_bar = y_bar.data() + StateLayout{d.n}.q(point.body);
-  Eigen::Map<Vector3d>{q_bar} += X_bar;
-  q_bar[3] += 2 * (b.e0 * along + e_s.dot(X_bar));
-  Eigen::Map<Vector3d>{q_bar + 4} += 2 * (b.e.dot(s) * X_bar + e_X * s - along * b.e + b.e0 * s.cross(X_bar));
+  double* q_bar = to.y_bar.data() + StateLayout{to.data.n}.q(point.body);
+  const double twice = 2 * to.scale;
+  Eigen::Map<Vector3d>{q_bar} += to.scale * X_bar;
+  q_bar[3] += twice * (b.e0 * along + e_s.dot(X_bar));
+  Eigen::Map<Vector3d>{q_bar + 4} += twice * (b.e.dot(s) * X_bar + e_X * s - along * b.e + b.e0 * s.cross(X_bar));
   const Vec<3> s_bar = (b.e0 * b.e0 - b.e.squaredNorm()) * X_bar + (2 * e_X) * b.e - (2 * b.e0) * b.e.cross(X_bar);
-  add_slot<3>(d, point.slot, s_bar, 1, rho_bar);
+  to.add_slot<3>(point.slot, s_bar);
 }
 
 // Kinematic acceleration (without gravity) of a body point, or the plain difference of two.   [m/s^2]
 //   W = Pddot_a - Pddot_b,  Pddot = rddot + Addot s;   a component of R'W in the axes R of a body or global, or |W|
 // It depends on the state and on z = (rddot, omegadot) of the bodies, which the equations of motion give.
 struct AccelerationSensor final : SensorFunction, SeenPoints {
-  double value(const MechanismData&, const StatePoint& at) const override {
-    const Vector3d W = difference(at);
-    if (component == kNorm) return W.norm();
-    return (body_at(at.y, std::max(axes_body, 0)).frame.A.transpose() * W)(component);
-  }
-
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
-    const Vector3d W = difference(at);
-    const BodyAt R = body_at(at.y, std::max(axes_body, 0));
-    double result = 0;
-    Vector3d W_bar = Vector3d::Zero();
-    if (component == kNorm) {
-      result = W.norm();
-      if (result > 0) W_bar = W / result;
-    } else {
-      result = (R.frame.A.transpose() * W)(component);
-      W_bar = R.frame.A.col(component);
-      if (axes_body > 0) {
-        FrameBar bar;
-        bar.set_zero();
-        bar.A.col(component) = W;
-        add_pull_back(R, axes_body, bar, scale, y_bar);
-      }
-    }
-    add_acceleration(d, at, a, W_bar, scale, y_bar, rho_bar);
-    if (relative) add_acceleration(d, at, b, -W_bar, scale, y_bar, rho_bar);
-    at.motion->fold_bar(at, y_bar, rho_bar);
-    return result;
-  }
-
- private:
-  Vector3d difference(const StatePoint& at) const {
+  double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
     Vector3d W = moving(at, a.body).frame.point_ddot(a.s);
     if (relative) W -= moving(at, b.body).frame.point_ddot(b.s);
-    return W;
+    const BodyAt R = body_at(at.y, std::max(axes_body, 0));
+    const Vector3d seen = R.frame.A.transpose() * W;
+    if (!to) return component_value(seen, component);
+    const Vector3d direction = component_gradient(seen, component), W_bar = R.frame.A * direction;
+    FrameBar bar;
+    bar.set_zero();
+    bar.A = W * direction.transpose();
+    if (axes_body > 0 && component != kNorm) to->add_frame(R, axes_body, bar);
+    add_acceleration(at, a, W_bar, *to);
+    if (relative) add_acceleration(at, b, -W_bar, *to);
+    at.motion->fold_bar(at, to->y_bar, to->rho_bar);
+    return component_value(seen, component);
   }
 };
 
@@ -145,30 +122,12 @@ void set_points(Compilation& model, const Sensor& s, SeenPoints& of, const std::
 
 }  // namespace
 
-double PointSensor::value(const MechanismData&, const StatePoint& at) const {
-  const Eigen::VectorXd& y = at.y;
-  if (is_place(*this)) return pick(relative ? Vector3d(place(a, y) - place(b, y)) : place(a, y));
-  const Seen x = seen(y);
-  const Vector3d L = x.R.frame.A.transpose() * x.X;
-  const Vector3d Ldot = x.R.frame.Adot.transpose() * x.X + x.R.frame.A.transpose() * x.V;
-  switch (quantity) {
-    case Quantity::position:
-      return pick(L);
-    case Quantity::position_rate:
-      return along(L).dot(Ldot);
-    case Quantity::velocity:
-      return pick(x.R.frame.A.transpose() * x.V);
-  }
-  return 0;
-}
-
-double PointSensor::add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                                 VecOut rho_bar) const {
+double PointSensor::evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const {
   const Eigen::VectorXd& y = at.y;
   if (is_place(*this)) {
-    const Vector3d L = relative ? Vector3d(place(a, y) - place(b, y)) : place(a, y), X_bar = scale * along(L);
-    add_place_bar(d, a, y, X_bar, y_bar, rho_bar);
-    if (relative) add_place_bar(d, b, y, -X_bar, y_bar, rho_bar);
+    const Vector3d L = relative ? Vector3d(place(a, y) - place(b, y)) : place(a, y);
+    if (to) add_place(a, y, along(L), *to);
+    if (to && relative) add_place(b, y, -along(L), *to);
     return pick(L);
   }
   const Seen x = seen(y);
@@ -198,9 +157,10 @@ double PointSensor::add_gradient(const MechanismData& d, const StatePoint& at, d
     R_bar.A = x.V * direction.transpose() + x.X * L_bar.transpose();
     R_bar.Adot = x.X * direction.transpose();
   }
-  if (axes_body >= 1) add_pull_back(x.R, axes_body, R_bar, scale, y_bar);
-  add_point(d, x.A, a, X_bar, V_bar, scale, y_bar, rho_bar);
-  if (relative) add_point(d, x.B, b, -X_bar, -V_bar, scale, y_bar, rho_bar);
+  if (!to) return result;
+  if (axes_body >= 1) to->add_frame(x.R, axes_body, R_bar);
+  add_point(x.A, a, X_bar, V_bar, *to);
+  if (relative) add_point(x.B, b, -X_bar, -V_bar, *to);
   return result;
 }
 
@@ -221,10 +181,7 @@ SensorPtr PointSensor::rate(const MechanismData&) const {
 }
 
 std::vector<SensorPtr> PointSensor::components() const {
-  if (quantity != PointSensor::Quantity::velocity || component != SensorFunction::kNorm) return {};
-  std::vector<SensorPtr> all;
-  for (int k = 0; k < 3; ++k) all.push_back(changed(*this, [&](PointSensor& c) { c.component = k; }));
-  return all;
+  return quantity == PointSensor::Quantity::velocity ? components_of_norm(*this) : std::vector<SensorPtr>();
 }
 
 std::unique_ptr<SensorFunction> make_place(Compilation& model, const Sensor& s, const std::string& where) {

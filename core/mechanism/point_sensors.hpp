@@ -8,8 +8,7 @@
 #include <string>
 
 #include "core/mechanism/compilation.hpp"
-#include "core/mechanism/sensor_function.hpp"
-#include "core/sensor/body_at.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 
 namespace mbsopt {
 
@@ -21,17 +20,15 @@ struct BodyPoint {
 
 BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where);
 
-// Adds scale times the gradients X_bar in the position of a body point and V_bar in its velocity.
-void add_point(const MechanismData& data, const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar,
-               const Vector3d& V_bar, double scale, VecOut y_bar, VecOut rho_bar);
+// Adds the gradients X_bar in the position of a body point and V_bar in its velocity.
+void add_point(const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar, const Vector3d& V_bar,
+               SensorGradient& to);
 
 // A body with the acceleration from the equations of motion.
 BodyAt moving(const StatePoint& at, int body);
 
-// Adds scale times the gradient of X' times the acceleration of the point. The part in the motion goes to
-// at.motion->bar().
-void add_acceleration(const MechanismData& data, const StatePoint& at, const BodyPoint& point, const Vector3d& X,
-                      double scale, VecOut y_bar, VecOut rho_bar);
+// Adds the gradient of X' times the acceleration of the point. The part in the motion goes to at.motion->bar().
+void add_acceleration(const StatePoint& at, const BodyPoint& point, const Vector3d& X, SensorGradient& to);
 
 // Sensors of points share these fields.
 struct SeenPoints {
@@ -45,9 +42,7 @@ struct PointSensor final : SensorFunction, SeenPoints {
   enum class Quantity { position, position_rate, velocity };
   Quantity quantity = Quantity::position;
 
-  double value(const MechanismData&, const StatePoint& at) const override;
-  double add_gradient(const MechanismData& data, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override;
+  double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override;
   std::vector<int> bodies(const MechanismData&) const override;
   SensorPtr rate(const MechanismData&) const override;
   std::vector<SensorPtr> components() const override;

@@ -5,7 +5,6 @@
 #include "core/constraint/constraint.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/mechanism/virtual_work.hpp"
-#include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
@@ -44,41 +43,30 @@ Vector3d measured(const ReactionSensor& s, const Loads& loads, const Matrix3d& A
 }
 
 // Adds the gradient of -(lambda' J2 eta), with eta of body 2 in its frame and none of body 1.
-void add_pull_back_of_loads(const MechanismData& d, const ReactionSensor& s, const Eigen::VectorXd& y,
-                            const Eigen::VectorXd& lambda, const Vec<6>& eta, double scale,
-                            Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& lambda_bar,
-                            Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  for (const Constraint& c : d.constraints) {
+void add_pull_back_of_loads(const ReactionSensor& s, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,
+                            const Vec<6>& eta, SensorGradient& to, Eigen::VectorXd& lambda_bar) {
+  for (const Constraint& c : to.data.constraints) {
     if (c.joint != s.joint) continue;
-    const ConstraintRows change = add_virtual_work_gradient(d, c, y, Vec<6>::Zero(), eta,
-                                                            -lambda.segment(c.row, c.rows()), scale, y_bar, rho_bar);
-    lambda_bar.segment(c.row, c.rows()) -= scale * c.factor * change;
+    const ConstraintRows change =
+        add_virtual_work_gradient(c, y, Vec<6>::Zero(), eta, -lambda.segment(c.row, c.rows()), to);
+    lambda_bar.segment(c.row, c.rows()) -= to.scale * c.factor * change;
   }
 }
 
 }  // namespace
 
-double ReactionSensor::value(const MechanismData& d, const StatePoint& at) const {
-  assert(at.motion);
-  const Eigen::VectorXd& lambda = at.motion->motion(at).lambda;
-  if (drive_row >= 0) return -lambda(drive_row);
-  const Vector3d x = measured(*this, loads_on_body2(d, *this, at.y, lambda), body_at(at.y, body2).frame.A);
-  return component_value(x, component);
-}
-
-double ReactionSensor::add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                                    VecOut rho_bar) const {
+double ReactionSensor::evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const {
   assert(at.motion);
   const Motion& motion = at.motion->motion(at);
-  const double value = add_gradient(d, at.y, motion.lambda, scale, y_bar, at.motion->bar().lambda, rho_bar);
-  at.motion->fold_bar(at, y_bar, rho_bar);
+  const double value = evaluate(d, at.y, motion.lambda, to, to ? &at.motion->bar().lambda : nullptr);
+  if (to) at.motion->fold_bar(at, to->y_bar, to->rho_bar);
   return value;
 }
 
-double ReactionSensor::add_gradient(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,
-                                    double scale, VecOut y_bar, Eigen::VectorXd& lambda_bar, VecOut rho_bar) const {
+double ReactionSensor::evaluate(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,
+                                SensorGradient* to, Eigen::VectorXd* lambda_bar) const {
   if (drive_row >= 0) {
-    lambda_bar(drive_row) -= scale;
+    if (to) (*lambda_bar)(drive_row) -= to->scale;
     return -lambda(drive_row);
   }
   const BodyAt b2 = body_at(y, body2);
@@ -86,6 +74,7 @@ double ReactionSensor::add_gradient(const MechanismData& d, const Eigen::VectorX
   const Loads loads = loads_on_body2(d, *this, y, lambda);
   const Vector3d x = measured(*this, loads, A2);
   const double result = component_value(x, component);
+  if (!to) return result;
   const Vector3d c = component_gradient(x, component);
 
   // c'x = F'eta_r + T'eta_theta with eta_r = c, or for a torque eta_theta = A2'c and eta_r = (A2 s2) x c
@@ -95,15 +84,15 @@ double ReactionSensor::add_gradient(const MechanismData& d, const Eigen::VectorX
   } else {
     eta.head<3>() = c;
   }
-  add_pull_back_of_loads(d, *this, y, lambda, eta, scale, y_bar, lambda_bar, rho_bar);
+  add_pull_back_of_loads(*this, y, lambda, eta, *to, *lambda_bar);
   if (!torque) return result;
   // The gradient through eta itself, with F and T fixed.
   const Vector3d arm_bar = c.cross(loads.F);
   FrameBar bar;
   bar.set_zero();
   bar.A = c * loads.T.transpose() + arm_bar * s2.transpose();
-  add_pull_back(b2, body2, bar, scale, y_bar);
-  add_slot<3>(d, slot_s2, Vec<3>(A2.transpose() * arm_bar), scale, rho_bar);
+  to->add_frame(b2, body2, bar);
+  to->add_slot<3>(slot_s2, Vec<3>(A2.transpose() * arm_bar));
   return result;
 }
 

@@ -21,12 +21,10 @@ struct ReactionSensor final : SensorFunction {
   int slot_s2 = -1;
   int drive_row = -1;  // of a drive's effort: its row of Phi
 
-  double value(const MechanismData& data, const StatePoint& at) const override;
-  double add_gradient(const MechanismData& data, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override;
-  // y_bar, lambda_bar, rho_bar += scale times the gradient at given lambda; returns the value.
-  double add_gradient(const MechanismData& data, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda, double scale,
-                      VecOut y_bar, Eigen::VectorXd& lambda_bar, VecOut rho_bar) const;
+  double evaluate(const MechanismData& data, const StatePoint& at, SensorGradient* to) const override;
+  // The same at given lambda; with `to`, lambda_bar gets the gradient in it.
+  double evaluate(const MechanismData& data, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,
+                  SensorGradient* to, Eigen::VectorXd* lambda_bar) const;
 };
 
 }  // namespace mbsopt

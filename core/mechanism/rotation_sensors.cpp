@@ -1,8 +1,8 @@
 // Angular velocity of a body, and its Euler parameters.
 //   omega_B = 2 G(p) pdot,  omega_G = A omega_B = 2 (e0 edot - e0dot e + e x edot)
 #include "core/body/state_layout.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
@@ -18,14 +18,10 @@ struct AngularVelocitySensor final : SensorFunction {
     const double sign = in_body_frame ? -1 : 1;
     return 2 * (b.state.p(0) * f - b.state.pdot(0) * e + sign * e.cross(f));
   }
-  double value(const MechanismData&, const StatePoint& at) const override {
-    const Vector3d w = omega(at.y);
-    return component_value(w, component);
-  }
-  double add_gradient(const MechanismData&, const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
+  double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
     const Vector3d w = omega(at.y);
     const double result = component_value(w, component);
-    if (body == 0) return result;
+    if (!to || body == 0) return result;
     const Vector3d d = component_gradient(w, component);
     const BodyAt b = body_at(at.y, body);
     const Vector4d &p = b.state.p, &pdot = b.state.pdot;
@@ -34,18 +30,13 @@ struct AngularVelocitySensor final : SensorFunction {
     Vector4d p_bar, pdot_bar;
     p_bar << d.dot(f), -pdot(0) * d + sign * f.cross(d);
     pdot_bar << -d.dot(e), p(0) * d + sign * d.cross(e);
-    const StateLayout layout = StateLayout::of(y_bar);
-    y_bar.segment<4>(layout.p(body)) += 2 * scale * p_bar;
-    y_bar.segment<4>(layout.pdot(body)) += 2 * scale * pdot_bar;
+    const StateLayout layout = StateLayout::of(at.y);
+    to->y_bar.segment<4>(layout.p(body)) += 2 * to->scale * p_bar;
+    to->y_bar.segment<4>(layout.pdot(body)) += 2 * to->scale * pdot_bar;
     return result;
   }
   std::vector<int> bodies(const MechanismData&) const override { return {body}; }
-  std::vector<SensorPtr> components() const override {
-    std::vector<SensorPtr> all;
-    for (int k = 0; k < 3 && component == kNorm; ++k)
-      all.push_back(changed(*this, [&](AngularVelocitySensor& c) { c.component = k; }));
-    return all;
-  }
+  std::vector<SensorPtr> components() const override { return components_of_norm(*this); }
 };
 
 // One entry of y: an Euler parameter, or its rate.
@@ -53,9 +44,8 @@ struct CoordinateFunction final : SensorFunction {
   int body = 0;
   Eigen::Index index = 0;  // in y
 
-  double value(const MechanismData&, const StatePoint& at) const override { return at.y(index); }
-  double add_gradient(const MechanismData&, const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
-    y_bar(index) += scale;
+  double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
+    if (to) to->y_bar(index) += to->scale;
     return at.y(index);
   }
   std::vector<int> bodies(const MechanismData&) const override { return {body}; }

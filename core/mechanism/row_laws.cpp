@@ -69,7 +69,8 @@ void RowLaws::add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* m
 void RowLaws::add_gradient(Derivative what, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
   if (!has_law(row)) return;
   const TimeLaw& law = data_->laws[index_of(row)].law;
-  if (what == Derivative::f) add_slot<1>(*data_, law.slot, Vec<1>(1), weight, rho_bar);
+  if (what == Derivative::f)
+    FieldGradient{data_->theta_rho, data_->active, weight, rho_bar}.add<1>(law.slot, Vec<1>(1));
   if (!law.programs) return;
   const Program& program = (*law.programs)[what == Derivative::f ? 0 : 1];
   Program::Scratch scratch = program.scratch();

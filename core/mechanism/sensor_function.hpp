@@ -10,6 +10,7 @@
 namespace mbsopt {
 
 struct MechanismData;
+struct SensorGradient;
 struct SensorFunction;
 using SensorPtr = std::shared_ptr<const SensorFunction>;
 
@@ -17,10 +18,8 @@ struct SensorFunction {
   static constexpr int kNorm = 3;  // the component that is a norm
 
   virtual ~SensorFunction() = default;
-  virtual double value(const MechanismData& data, const StatePoint& at) const = 0;
-  // y_bar, rho_bar += scale d/dy, d/drho (of all parameters); returns the value.
-  virtual double add_gradient(const MechanismData& data, const StatePoint& at, double scale, VecOut y_bar,
-                              VecOut rho_bar) const = 0;
+  // Returns the value. `to` gets the gradient, if it is not null (sensor_gradient.hpp).
+  virtual double evaluate(const MechanismData& data, const StatePoint& at, SensorGradient* to) const = 0;
   // The bodies that the sensor reads. An empty list means all bodies.
   virtual std::vector<int> bodies(const MechanismData&) const { return {}; }
   // Its time derivative; null if a condition may not prescribe one.
@@ -51,14 +50,13 @@ SensorPtr changed(const Kind& sensor, const Change& change) {
   return copy;
 }
 
-// Evaluates at (y, branch of the angles), for sensors that need no motion.
-inline double evaluate(const MechanismData& data, const SensorPtr& sensor, double t, const Eigen::VectorXd& y,
-                       const Eigen::VectorXd& angles) {
-  return sensor->value(data, {t, y, angles});
-}
-inline double add_gradient(const MechanismData& data, const SensorPtr& sensor, double t, const Eigen::VectorXd& y,
-                           const Eigen::VectorXd& angles, double scale, VecOut y_bar, VecOut rho_bar) {
-  return sensor->add_gradient(data, {t, y, angles}, scale, y_bar, rho_bar);
+// The three components of a sensor of a norm, as SensorFunction::components() returns them.
+template <class Kind>
+std::vector<SensorPtr> components_of_norm(const Kind& sensor) {
+  std::vector<SensorPtr> all;
+  for (int k = 0; k < 3 && sensor.component == SensorFunction::kNorm; ++k)
+    all.push_back(changed(sensor, [&](Kind& c) { c.component = k; }));
+  return all;
 }
 
 }  // namespace mbsopt

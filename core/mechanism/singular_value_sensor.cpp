@@ -15,7 +15,6 @@
 #include "core/linear/dense.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/mechanism/virtual_work.hpp"
-#include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
@@ -68,12 +67,9 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
 }
 
 struct SingularValueFunction final : SensorFunction {
-  double value(const MechanismData& d, const StatePoint& at) const override { return scaled(d, at.y).smallest; }
-
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
     const Scaled x = scaled(d, at.y);
-    if (x.J.size() == 0) return x.smallest;
+    if (!to || x.J.size() == 0) return x.smallest;
     Eigen::MatrixXd W = Eigen::MatrixXd::Zero(x.J.rows(), x.J.cols());  // w_i, then J's own columns
     const StateLayout layout{d.n};
     double L_bar = 0;
@@ -88,22 +84,20 @@ struct SingularValueFunction final : SensorFunction {
       }
     }
     for (const Constraint& c : d.constraints)
-      for (int i = 0; i < c.rows(); ++i) add_row(d, c, i, W.row(c.row + i).transpose(), at.y, scale, y_bar, rho_bar);
-    for_each_point(d, [&](const Vector3d& s, int slot) {
-      add_slot<3>(d, slot, Vec<3>(L_bar / (x.points * x.length) * s), scale, rho_bar);
-    });
+      for (int i = 0; i < c.rows(); ++i) add_row(c, i, W.row(c.row + i).transpose(), at.y, *to);
+    for_each_point(
+        d, [&](const Vector3d& s, int slot) { to->add_slot<3>(slot, Vec<3>(L_bar / (x.points * x.length) * s)); });
     return x.smallest;
   }
 
  private:
   // Adds the gradient of w'j of row i of a constraint; w is a virtual displacement of all bodies.
-  static void add_row(const MechanismData& d, const Constraint& c, int i, const Eigen::VectorXd& w,
-                      const Eigen::VectorXd& y, double scale, VecOut y_bar, VecOut rho_bar) {
+  static void add_row(const Constraint& c, int i, const Eigen::VectorXd& w, const Eigen::VectorXd& y,
+                      SensorGradient& to) {
     const auto part = [&](int body) {
-      return body > 0 ? Vec<6>(w.segment<6>(StateLayout{d.n}.z(body))) : Vec<6>(Vec<6>::Zero());
+      return body > 0 ? Vec<6>(w.segment<6>(StateLayout{to.data.n}.z(body))) : Vec<6>(Vec<6>::Zero());
     };
-    add_virtual_work_gradient(d, c, y, part(c.body1), part(c.body2), ConstraintRows::Unit(c.rows(), i), scale, y_bar,
-                              rho_bar);
+    add_virtual_work_gradient(c, y, part(c.body1), part(c.body2), ConstraintRows::Unit(c.rows(), i), to);
   }
 };
 

@@ -3,8 +3,8 @@
 //   f(x, xdot, t, rho),   x = l or the joint's angle
 //   f_y = f_x x_y + f_xdot xdot_y          f_rho = the law's own + through the geometry
 #include "core/force/forces.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
@@ -25,28 +25,15 @@ Law::Scratch& scratch_for(const MechanismData& data, const Law& law, Law::Scratc
 }
 
 // Adds the gradient through the law's own coefficients, or through the parameters of its expression.
-void add_law_gradient(const MechanismData& data, const Law& law, double x, double xdot, double scale,
-                      const Law::Scratch& scratch, Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  if (!law.program) return add_slot<4>(data, law.slot, law.field_gradient(x, xdot), scale, rho_bar);
-  for (const int k : data.active) rho_bar(k) += scale * scratch.gradient[static_cast<std::size_t>(k)];
+void add_law_gradient(const Law& law, double x, double xdot, const Law::Scratch& scratch, SensorGradient& to) {
+  if (!law.program) return to.add_slot<4>(law.slot, law.field_gradient(x, xdot));
+  for (const int k : to.data.active) to.rho_bar(k) += to.scale * scratch.gradient[static_cast<std::size_t>(k)];
 }
 
 struct TensionFunction final : SensorFunction {
   ForcePlace place;
 
-  double value(const MechanismData& d, const StatePoint& at) const override {
-    double value = 0;
-    d.forces->visit_law(place, [&](const auto& f) {
-      Law::Scratch none;
-      const auto [i, j] = f.bodies();
-      const auto [x, xdot] = f.measured(at.angles, body_at(at.y, i).frame, body_at(at.y, j).frame);
-      value = f.law.value(at.t, d.rho, x, xdot, scratch_for(d, f.law, none));
-    });
-    return value;
-  }
-
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
     double value = 0;
     d.forces->visit_law(place, [&](const auto& f) {
       Law::Scratch none;
@@ -54,14 +41,17 @@ struct TensionFunction final : SensorFunction {
       const auto [i, j] = f.bodies();
       const BodyAt b1 = body_at(at.y, i), b2 = body_at(at.y, j);
       const auto [x, xdot] = f.measured(at.angles, b1.frame, b2.frame);
+      if (!to) {
+        value = f.law.value(at.t, d.rho, x, xdot, scratch);
+        return;
+      }
       const Law::Value law = f.law.derivatives(at.t, d.rho, x, xdot, scratch);
-      add_law_gradient(d, f.law, x, xdot, scale, scratch, rho_bar);
+      add_law_gradient(f.law, x, xdot, scratch, *to);
       FrameBar bar1, bar2;
       bar1.set_zero(), bar2.set_zero();
-      FieldGradient fields{d.theta_rho, d.active, scale, rho_bar};
+      FieldGradient fields = to->fields();
       f.pull_back_measured(b1.frame, b2.frame, law.f_x, law.f_xdot, bar1, bar2, fields);
-      add_pull_back(b1, i, bar1, scale, y_bar);
-      add_pull_back(b2, j, bar2, scale, y_bar);
+      to->add_frame(b1, i, bar1), to->add_frame(b2, j, bar2);
       value = law.f;
     });
     return value;

@@ -6,8 +6,8 @@
 // McCarthy, G. S. Soh, "Geometric Design of Linkages", section 2.3.
 #include <cmath>
 
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
@@ -23,33 +23,26 @@ struct Link {
 struct TransmissionFunction final : SensorFunction {
   Link link1, link2;
 
-  double value(const MechanismData&, const StatePoint& at) const override {
-    const Vector3d x1 = body_at(at.y, link1.body).frame.A * link1.s, x2 = body_at(at.y, link2.body).frame.A * link2.s;
-    return std::atan2(x1.cross(x2).norm(), x1.dot(x2));
-  }
-
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
+  double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
     const BodyAt b1 = body_at(at.y, link1.body), b2 = body_at(at.y, link2.body);
     const Vector3d x1 = b1.frame.A * link1.s, x2 = b2.frame.A * link2.s;
     const double across = x1.cross(x2).norm(), along = x1.dot(x2);
     // across = |x1| |x2| sin(mu): the formula never divides by a length of zero.
-    if (across > 0) {
-      add(d, link1, b1, (along / x1.squaredNorm() * x1 - x2) / across, scale, y_bar, rho_bar);
-      add(d, link2, b2, (along / x2.squaredNorm() * x2 - x1) / across, scale, y_bar, rho_bar);
+    if (to && across > 0) {
+      add(link1, b1, (along / x1.squaredNorm() * x1 - x2) / across, *to);
+      add(link2, b2, (along / x2.squaredNorm() * x2 - x1) / across, *to);
     }
     return std::atan2(across, along);
   }
   std::vector<int> bodies(const MechanismData&) const override { return {link1.body, link2.body}; }
 
  private:
-  static void add(const MechanismData& d, const Link& link, const BodyAt& body, const Vector3d& x_bar, double scale,
-                  VecOut y_bar, VecOut rho_bar) {
+  static void add(const Link& link, const BodyAt& body, const Vector3d& x_bar, SensorGradient& to) {
     FrameBar bar;
     bar.set_zero();
     bar.A = x_bar * link.s.transpose();
-    add_pull_back(body, link.body, bar, scale, y_bar);
-    add_slot<3>(d, link.slot, Vec<3>(body.frame.A.transpose() * x_bar), scale, rho_bar);
+    to.add_frame(body, link.body, bar);
+    to.add_slot<3>(link.slot, Vec<3>(body.frame.A.transpose() * x_bar));
   }
 };
 

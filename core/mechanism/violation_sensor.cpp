@@ -5,8 +5,8 @@
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/mechanism/row_laws.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 namespace {
@@ -68,23 +68,26 @@ Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorX
 }
 
 struct ViolationFunction final : SensorFunction {
-  double value(const MechanismData& d, const StatePoint& at) const override {
-    return std::abs(worst_violation(d, at.t, at.y, at.angles).amount);
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
+    const Violation worst = worst_violation(d, at.t, at.y, at.angles);
+    if (to) {
+      SensorGradient of_amount{d, worst.amount < 0 ? -to->scale : to->scale, to->y_bar, to->rho_bar};
+      add_gradient(worst, at, of_amount);
+    }
+    return std::abs(worst.amount);
   }
-  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
-                      VecOut rho_bar) const override {
-    const double t = at.t;
+
+ private:
+  static void add_gradient(const Violation& worst, const StatePoint& at, SensorGradient& to) {
+    const MechanismData& d = to.data;
     const Eigen::VectorXd &y = at.y, &angles = at.angles;
-    const Violation worst = worst_violation(d, t, y, angles);
-    const double s = worst.amount < 0 ? -scale : scale;
     if (worst.body > 0) {
       const Eigen::Index p = StateLayout{d.n}.p(worst.body);
-      y_bar.segment<4>(p) += s * UnitNorm::phi_p(y.segment<4>(p));
-      return std::abs(worst.amount);
+      to.y_bar.segment<4>(p) += to.scale * UnitNorm::phi_p(y.segment<4>(p));
     }
-    if (worst.row < 0) return 0;
-    const RowLaws laws = laws_at(d, t);
-    laws.add_gradient(RowLaws::Derivative::f, worst.row, -s, rho_bar);
+    if (worst.row < 0) return;
+    const RowLaws laws = laws_at(d, at.t);
+    laws.add_gradient(RowLaws::Derivative::f, worst.row, -to.scale, to.rho_bar);
     for (const Constraint& c : d.constraints) {
       if (worst.row < c.row || worst.row >= c.row + c.rows()) continue;
       const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
@@ -98,16 +101,12 @@ struct ViolationFunction final : SensorFunction {
             p.pull_back(b1.frame, b2.frame, z, bar1, bar2, s_bar);
             if (c.slot_factor < 0) return;
             const double value = phi_of(laws, c, p, b1, b2, angles)(worst.row - c.row);
-            add_slot<1>(d, c.slot_factor, Vec<1>(value), s, rho_bar);
+            to.add_slot<1>(c.slot_factor, Vec<1>(value));
           },
           c.primitive);
-      add_pull_back(b1, c.body1, bar1, s, y_bar);
-      add_pull_back(b2, c.body2, bar2, s, y_bar);
-      add_slot<3>(d, c.slot1, s_bar.s1, s, rho_bar);
-      add_slot<3>(d, c.slot2, s_bar.s2, s, rho_bar);
-      add_slot<3>(d, c.slot3, s_bar.s3, s, rho_bar);
+      to.add_frame(b1, c.body1, bar1), to.add_frame(b2, c.body2, bar2);
+      to.add_slot<3>(c.slot1, s_bar.s1), to.add_slot<3>(c.slot2, s_bar.s2), to.add_slot<3>(c.slot3, s_bar.s3);
     }
-    return std::abs(worst.amount);
   }
 };
 

@@ -5,18 +5,15 @@
 #include <variant>
 
 #include "core/constraint/constraint.hpp"
-#include "core/mechanism/sensor_kinds.hpp"
-#include "core/sensor/body_at.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 
 namespace mbsopt {
 
 using ConstraintRows = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;  // of one constraint: three at most
 
-// Adds scale times the gradient in y and rho; returns J1 eta1 + J2 eta2 without the factor.
-inline ConstraintRows add_virtual_work_gradient(const MechanismData& d, const Constraint& c, const Eigen::VectorXd& y,
-                                                const Vec<6>& eta1, const Vec<6>& eta2, const ConstraintRows& weights,
-                                                double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
-                                                Eigen::Ref<Eigen::VectorXd> rho_bar) {
+// Returns J1 eta1 + J2 eta2 without the factor.
+inline ConstraintRows add_virtual_work_gradient(const Constraint& c, const Eigen::VectorXd& y, const Vec<6>& eta1,
+                                                const Vec<6>& eta2, const ConstraintRows& weights, SensorGradient& to) {
   BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
   set_virtual(eta1, b1.frame);
   set_virtual(eta2, b2.frame);
@@ -32,14 +29,11 @@ inline ConstraintRows add_virtual_work_gradient(const MechanismData& d, const Co
         change = virtual_change(p, b1.frame, b2.frame);
       },
       c.primitive);
-  add_slot<1>(d, c.slot_factor, Vec<1>(weights.dot(change)), scale, rho_bar);
+  to.add_slot<1>(c.slot_factor, Vec<1>(weights.dot(change)));
   fold_virtual(eta1.tail<3>(), bar1);
   fold_virtual(eta2.tail<3>(), bar2);
-  add_pull_back(b1, c.body1, bar1, scale, y_bar);
-  add_pull_back(b2, c.body2, bar2, scale, y_bar);
-  add_slot<3>(d, c.slot1, geometry.s1, scale, rho_bar);
-  add_slot<3>(d, c.slot2, geometry.s2, scale, rho_bar);
-  add_slot<3>(d, c.slot3, geometry.s3, scale, rho_bar);
+  to.add_frame(b1, c.body1, bar1), to.add_frame(b2, c.body2, bar2);
+  to.add_slot<3>(c.slot1, geometry.s1), to.add_slot<3>(c.slot2, geometry.s2), to.add_slot<3>(c.slot3, geometry.s3);
   return change;
 }
 

@@ -17,6 +17,7 @@
 #include "core/linear/sparse_projection.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/mechanism/rounded_loops.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/projection/projection.hpp"
 #include "core/start/assembly_equations.hpp"
 #include "core/start/assembly_problems.hpp"

@@ -8,6 +8,7 @@
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/mechanism/followed_angles.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 
 namespace mbsopt {
 

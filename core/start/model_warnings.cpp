@@ -19,6 +19,7 @@
 #include "core/mechanism/planar_model.hpp"
 #include "core/mechanism/reaction_sensor.hpp"
 #include "core/mechanism/rounded_loops.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/start/assembly_problems.hpp"
 
@@ -125,13 +126,14 @@ Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const V
   const bool norm = sensor.component == SensorFunction::kNorm;
   const VectorXd none = VectorXd::Zero(d.m);
   VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(d.rho.size());
+  SensorGradient to{d, 1, y_bar, rho_bar};
   Eigen::MatrixXd columns(d.m, 0);
   for (int k = 0; k < 3; ++k) {
     if (!norm && k != sensor.component) continue;
     ReactionSensor part = sensor;
     part.component = k;
     VectorXd b = none;
-    part.add_gradient(d, y, none, 1, y_bar, b, rho_bar);
+    part.evaluate(d, y, none, &to, &b);
     const bool in_plane = !d.planar || (k == d.planar->n) == sensor.torque;
     const double all = b.lpNorm<Eigen::Infinity>() * lambda.lpNorm<Eigen::Infinity>();
     if (norm && !in_plane && std::abs(b.dot(lambda)) <= kRounding * all) continue;

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <functional>
 
-#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/sensor_gradient.hpp"
 #include "tests/core/body/textbook_body.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 
