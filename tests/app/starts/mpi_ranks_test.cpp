@@ -28,10 +28,12 @@ struct Finished {
   std::string out, err;
 };
 
-// mpirun -n ranks mbsopt arguments, in its own session, as from a terminal of its own.
+// mpirun -n ranks mbsopt arguments, in its own session, as from a terminal of its own. Ranks that wait leave the
+// processor to others: the tests run in parallel.
 pid_t started(int ranks, const std::vector<std::string>& arguments, const TemporaryFolder& folder) {
-  std::vector<std::string> words{MBSOPT_MPIRUN, "--allow-run-as-root", "--oversubscribe", "--bind-to", "none",
-                                 "-n",          std::to_string(ranks), MBSOPT_PROGRAM};
+  std::vector<std::string> words{
+      MBSOPT_MPIRUN, "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1",
+      "-n",          std::to_string(ranks), MBSOPT_PROGRAM};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
