@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <map>
 #include <optional>
 #include <string_view>
 
@@ -19,19 +19,14 @@ namespace {
 
 // Counts independent closed chains: joints between bodies that other joints connect already. The ground is a body here.
 int loops_of(const Scene& scene) {
-  std::vector<std::string> names{"ground"};
-  for (const Body& body : scene.bodies) names.push_back(body.name);
-  std::vector<std::size_t> group(names.size());
-  std::iota(group.begin(), group.end(), std::size_t{0});
-  const auto group_of = [&](const std::string& body) {
-    const auto found = std::find(names.begin(), names.end(), body);
-    return found == names.end() ? 0 : group[static_cast<std::size_t>(found - names.begin())];
-  };
+  std::map<std::string, int> group;  // of connected bodies; 0: of the ground
+  for (const Body& body : scene.bodies) group.emplace(body.name, static_cast<int>(group.size()) + 1);
   int loops = 0;
   for (const Joint& joint : scene.joints) {
-    const std::size_t one = group_of(joint.body1), other = group_of(joint.body2);
+    const int one = group[joint.body1], other = group[joint.body2];
     if (one == other) ++loops;
-    std::replace(group.begin(), group.end(), one, other);
+    for (auto& [body, number] : group)
+      if (number == one) number = other;
   }
   return loops;
 }

@@ -127,14 +127,10 @@ std::string TaskAdviser::lacking_reference(double accuracy) const {
 Recommendation TaskAdviser::at(double accuracy) {
   if (const std::string why_not = lacking_reference(accuracy); !why_not.empty())
     return {quantities_, accuracy, {}, why_not};
-  if (!fit_) return recommend(tradeoff_, quantities_, accuracy);
   Recommendation advice =
-      recommend(tradeoff_, quantities_, accuracy, [&](std::size_t row) { return fits(row, accuracy); });
-  if (advice.row) {
-    advice.fit = measured_.at(*advice.row);
-  } else if (out_of_time_) {
-    advice.why_not += fmt::format("; the {:.3g} s for fits are over", seconds_);
-  }
+      recommend(tradeoff_, quantities_, accuracy, [&](std::size_t row) { return !fit_ || fits(row, accuracy); });
+  if (fit_ && advice.row) advice.fit = measured_.at(*advice.row);
+  if (!advice.row && out_of_time_) advice.why_not += fmt::format("; the {:.3g} s for fits are over", seconds_);
   return advice;
 }
 

@@ -27,9 +27,9 @@ enum class QuantityKind { motion, sensors, objective, gradient };
 
 struct Quantity {
   QuantityKind kind = QuantityKind::motion;
-  std::string name;            // "motion", "sensors", "travel" ("objective motion"), "gradient of travel"
-  std::string objective_name;  // of objective, gradient
-  Eigen::Index objective = 0;  // of objective, gradient
+  std::string name;                 // "motion", "sensors", "travel" ("objective motion"), "gradient of travel"
+  std::string objective_name = {};  // of objective, gradient
+  Eigen::Index objective = 0;       // of objective, gradient
   bool relative = true;
   double scale = 1;        // divisor of the error
   double certificate = 0;  // difference of two methods in the same measure
@@ -64,7 +64,7 @@ class TradeoffErrors {
   double deviation(const Quantity& quantity, const Answer& answer, const Answer& exact) const;
   Eigen::VectorXd each(Measure measure, const Answer& answer, const Answer& exact) const;
   bool is_known(double size, double apart) const { return size > clearly_ * apart; }
-  double sensor_error(const Answer& answer, const Answer& exact) const;
+  bool has(const Quantity& quantity, const Answer& answer) const;
   double gradient_size(const Eigen::Ref<const Eigen::RowVectorXd>& gradient) const;
 
   MotionDistance distance_;

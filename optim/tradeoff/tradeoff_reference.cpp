@@ -9,17 +9,29 @@
 #include <utility>
 
 #include "core/scene/default_integrator.hpp"
+#include "core/tableau/tableaus.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr const char* kStepped[] = {"gauss6", "radau5"};  // methods that also take steps of one size
 
 struct Candidate {
   ReferenceMethod method;
   SimulationSettings settings;
   Answer answer;
   double change = kInfinity;  // made by the last refinement
+
+  bool has_settled() const { return change < 1e-9; }
+  // Returns whether a stage came so close to a singular position that its equations were regularised ones.
+  bool is_unmet() const { return answer.statistics.max_acceleration_residual > 1e-9; }
+};
+
+// Gradients of two methods; the second certifies the first.
+struct GradientPair {
+  Answer answer, certificate;
+  double apart = kInfinity;  // of the closest two
 };
 
 // Settings of a method from loose to tight, and what ends their series.
@@ -38,18 +50,12 @@ Refinement tighter_tolerances(const std::string& integrator) {
   return series;
 }
 
-struct Stepped {
-  const char* integrator;
-  int order;
-};
-constexpr Stepped kStepped[] = {{"gauss6", 6}, {"radau5", 5}};
-
 // Halved steps, which use no more right-hand sides than step-size control did.
-Refinement halved_steps(const Stepped& by, double span, double most_evaluations) {
+Refinement halved_steps(const char* integrator, double span, double most_evaluations) {
   constexpr double kLeft = 6e-11, kResolved = 1e-3;
   constexpr int kFewest = 125, kMost = 1 << 16;  // steps
-  Refinement series{{}, 2, kLeft * (1 << by.order), kResolved, most_evaluations};
-  for (int count = kFewest; count <= kMost; count *= 2) series.methods.push_back({by.integrator, 0, span / count});
+  Refinement series{{}, 2, kLeft * (1 << runge_kutta_method(integrator)->order), kResolved, most_evaluations};
+  for (int count = kFewest; count <= kMost; count *= 2) series.methods.push_back({integrator, 0, span / count});
   return series;
 }
 
@@ -62,19 +68,19 @@ class Search {
     TradeoffReference reference;
     std::vector<Candidate> found;
     for (const char* integrator : {"dopri853", "gauss6", "verner6", "radau5"}) {
-      if (agree(found) || interrupted()) break;
-      if (std::optional<Candidate> candidate = refined(tighter_tolerances(integrator)))
-        found.push_back(std::move(*candidate));
+      const bool agree = std::ranges::count_if(found, &Candidate::has_settled) >= 2 && closest(found).apart < kAgreeing;
+      if (agree || interrupted()) break;
+      add(refined(tighter_tolerances(integrator)), found);
     }
-    if (std::ranges::any_of(found, is_unmet)) add_stepped(found);
+    if (std::ranges::any_of(found, &Candidate::is_unmet)) add_stepped(found);
     reference.interrupted = interrupted();
     if (found.size() < 2) {
       reference.message = fmt::format("no reference was found by two methods: {}", problem_);
     } else {
-      auto [first, second] = closest(found);
-      if (found[second].change < found[first].change) std::swap(first, second);
-      Candidate &a = found[first], &b = found[second];
-      add_gradients(a, b, reference);
+      Pair pair = closest(found);
+      if (found[pair.second].change < found[pair.first].change) std::swap(pair.first, pair.second);
+      Candidate &a = found[pair.first], &b = found[pair.second];
+      if (runs_.has_gradients() && options_.gradients) add_gradients(a, b, reference);
       reference.first = a.method, reference.second = b.method;
       reference.errors.emplace(runs_, std::move(a.answer), b.answer);
     }
@@ -96,21 +102,8 @@ class Search {
     return limit;
   }
 
-  static bool has_settled(const Candidate& c) {
-    constexpr double kSettled = 1e-9;
-    return c.change < kSettled;
-  }
-  // Returns whether a stage came so close to a singular position that its equations were regularised ones.
-  static bool is_unmet(const Candidate& c) { return c.answer.statistics.max_acceleration_residual > 1e-9; }
-
-  // Returns whether two candidates have settled on the same answer.
-  bool agree(const std::vector<Candidate>& found) const {
-    return std::ranges::count_if(found, has_settled) >= 2 && least_apart(found) < kAgreeing;
-  }
-
-  double least_apart(const std::vector<Candidate>& found) const {
-    const auto [first, second] = closest(found);
-    return apart(found[first].answer, found[second].answer);
+  static void add(std::optional<Candidate> candidate, std::vector<Candidate>& found) {
+    if (candidate) found.push_back(std::move(*candidate));
   }
 
   // Refines until the answer no longer settles. Steps that are too large for any answer are left out.
@@ -140,55 +133,49 @@ class Search {
     return best;
   }
 
-  std::optional<Candidate> stepped(const Stepped& by, double most_evaluations) {
-    return refined(halved_steps(by, own().end_time - own().start_time, most_evaluations));
+  std::optional<Candidate> stepped(const char* integrator, double most_evaluations) {
+    return refined(halved_steps(integrator, own().end_time - own().start_time, most_evaluations));
   }
 
   // If these agree, nothing else counts.
   void add_stepped(std::vector<Candidate>& found) {
     long most_evaluations = 0;
     for (const Candidate& c : found) most_evaluations = std::max(most_evaluations, c.answer.statistics.rhs_evaluations);
-    for (const Stepped& by : kStepped) {
+    for (const char* integrator : kStepped) {
       if (interrupted()) return;
-      if (std::optional<Candidate> candidate = stepped(by, static_cast<double>(most_evaluations)))
-        found.push_back(std::move(*candidate));
+      add(stepped(integrator, static_cast<double>(most_evaluations)), found);
     }
     std::vector<Candidate> met = found;
-    std::erase_if(met, is_unmet);
-    if (met.size() >= 2 && least_apart(met) < kAgreeing) found = std::move(met);
+    std::erase_if(met, std::mem_fn(&Candidate::is_unmet));
+    if (met.size() >= 2 && closest(met).apart < kAgreeing) found = std::move(met);
   }
 
-  // The largest relative difference of the motion and of the objectives.
-  double apart(const Answer& a, const Answer& b) const {
-    const TradeoffErrors errors(runs_, a, b);
+  // The largest relative difference of the motion and of the objectives, or of the gradients.
+  double apart(const Answer& a, const Answer& b, bool gradients = false) const {
+    const TradeoffErrors errors = gradients ? TradeoffErrors(runs_, a, b, 0) : TradeoffErrors(runs_, a, b);
     double largest = 0;
-    for (const Quantity& q : errors.quantities())
-      if (q.kind == QuantityKind::motion || (q.kind == QuantityKind::objective && q.relative))
-        largest = std::max(largest, q.certificate);
+    for (const Quantity& q : errors.quantities()) {
+      const bool of_values = q.kind == QuantityKind::motion || (q.kind == QuantityKind::objective && q.relative);
+      if (gradients ? q.kind == QuantityKind::gradient : of_values) largest = std::max(largest, q.certificate);
+    }
     return largest;
   }
 
-  // The largest relative difference of the gradients.
-  double gradients_apart(const Answer& a, const Answer& b) const {
-    constexpr double kAnySize = 0;
-    const TradeoffErrors errors(runs_, a, b, kAnySize);
-    double largest = 0;
-    for (const Quantity& q : errors.quantities())
-      if (q.kind == QuantityKind::gradient) largest = std::max(largest, q.certificate);
-    return largest;
-  }
-
+  struct Pair {
+    std::size_t first = 0, second = 1;
+    double apart = kInfinity;
+  };
   // Compare a method with its fixed-step form only if no two methods agree. Compare an answer that has not settled only
   // if there are no two others: it may be close by chance.
-  std::pair<std::size_t, std::size_t> closest(const std::vector<Candidate>& found) const {
-    std::pair<std::size_t, std::size_t> pair{0, 1};
-    std::pair best{1, kInfinity};  // the rank with its sign reversed, and the distance
+  Pair closest(const std::vector<Candidate>& found) const {
+    Pair pair;
+    int best = 1;  // the rank with its sign reversed
     for (std::size_t i = 0; i < found.size(); ++i) {
       for (std::size_t j = i + 1; j < found.size(); ++j) {
         const double here = apart(found[i].answer, found[j].answer);
         const bool differ = found[i].method.integrator != found[j].method.integrator && here < kAgreeing;
-        const std::pair rank{-2 * differ - (has_settled(found[i]) && has_settled(found[j])), here};
-        if (rank < best) best = rank, pair = {i, j};
+        const int rank = -2 * differ - (found[i].has_settled() && found[j].has_settled());
+        if (std::pair(rank, here) < std::pair(best, pair.apart)) best = rank, pair = {i, j, here};
       }
     }
     return pair;
@@ -196,8 +183,7 @@ class Search {
 
   // Takes the gradients of two ways to the same answer that agree best. `a` is the more exact way.
   void add_gradients(Candidate& a, Candidate& b, TradeoffReference& reference) {
-    if (!runs_.has_gradients() || !options_.gradients) return;
-    Gradients best = closest_gradients(gradients_of(a), gradients_of(b));
+    GradientPair best = closest_gradients(gradients_of(a), gradients_of(b));
     if (!best.answer.ok) return;
     reference.gradients_by = to_string(runs_.discrete_method());
     if (!a.method.step && !b.method.step) {
@@ -226,21 +212,15 @@ class Search {
     return answers;
   }
 
-  // Gradients of two methods.
-  struct Gradients {
-    Answer answer, certificate;
-    double apart = kInfinity;  // of the closest two
-  };
-
   // The answer that agrees best with any of the other method's, and its certificate. The certificate is that other
   // answer, or the next best of either method, since the best of many is chance. It is not ok if a method has none.
-  Gradients closest_gradients(const std::vector<Answer>& of_a, const std::vector<Answer>& of_b) const {
+  GradientPair closest_gradients(const std::vector<Answer>& of_a, const std::vector<Answer>& of_b) const {
     const Answer *answer = nullptr, *closest = nullptr, *next = nullptr;
     double least = kInfinity, next_least = kInfinity;
     for (const Answer& a : of_a) {
       for (const Answer& b : of_b) {
         if (!a.ok || !b.ok) continue;
-        const double here = gradients_apart(a, b);
+        const double here = apart(a, b, true);
         if (!answer || here < least) answer = &a, closest = &b, least = here;
       }
     }
@@ -248,7 +228,7 @@ class Search {
     for (const std::vector<Answer>* answers : {&of_a, &of_b}) {
       for (const Answer& other : *answers) {
         if (!other.ok || &other == answer || &other == closest) continue;
-        const double here = gradients_apart(*answer, other);
+        const double here = apart(*answer, other, true);
         if (here < next_least) next = &other, next_least = here;
       }
     }
@@ -257,37 +237,37 @@ class Search {
 
   // Step-size control sees only the motion. Effects on derivatives alone, such as a kink of a law in a parameter, need
   // shorter steps. This takes the pair that agrees best.
-  void shorten_steps(SimulationSettings of_a, SimulationSettings of_b, Gradients& best) const {
+  void shorten_steps(SimulationSettings of_a, SimulationSettings of_b, GradientPair& best) const {
     constexpr double kSame = 1e-8, kShorter = 3;
     constexpr int kRounds = 4, kInVain = 2;
-    const auto shortened = [&](SimulationSettings& s, const Answer& by) {
-      s.integrator.max_step = std::ranges::max(by.steps.sizes) / kShorter;
-      return gradients_at(s);
+    const auto shorten = [&](SimulationSettings& s, Answer& answer) {
+      s.integrator.max_step = std::ranges::max(answer.steps.sizes) / kShorter;
+      answer = gradients_at(s);
+      return answer.ok;
     };
-    if (best.answer.steps.sizes.empty() || best.certificate.steps.sizes.empty()) return;
     Answer a = best.answer, b = best.certificate;
+    if (a.steps.sizes.empty() || b.steps.sizes.empty()) return;
     for (int round = 0, in_vain = 0; round < kRounds && in_vain < kInVain && best.apart > kSame; ++round) {
       if (kShorter * std::max(a.wall_seconds, b.wall_seconds) > options_.seconds_per_run) return;
-      a = shortened(of_a, a), b = shortened(of_b, b);
-      if (!a.ok || !b.ok) return;
-      const double apart = gradients_apart(a, b);
+      if (!shorten(of_a, a) || !shorten(of_b, b)) return;
+      const double here = apart(a, b, true);
       ++in_vain;
-      if (apart < best.apart) best = {a, b, apart}, in_vain = 0;
+      if (here < best.apart) best = {a, b, here}, in_vain = 0;
     }
   }
 
   // Derivatives of steps past singular positions settle later than the motion, or not at all. Takes steps of one size
   // if they agree better, and returns whether they do.
-  bool step_evenly(Gradients& best) {
+  bool step_evenly(GradientPair& best) {
     constexpr double kSettled = 5e-10;
     if (best.apart < kSettled || interrupted()) return false;
     std::vector<std::vector<Answer>> answers;
-    for (const Stepped& by : kStepped) {
-      const std::optional<Candidate> candidate = stepped(by, kInfinity);
+    for (const char* integrator : kStepped) {
+      const std::optional<Candidate> candidate = stepped(integrator, kInfinity);
       if (!candidate) return false;
       answers.push_back(gradients_of(*candidate));
     }
-    Gradients even = closest_gradients(answers[0], answers[1]);
+    GradientPair even = closest_gradients(answers[0], answers[1]);
     if (!(even.apart < best.apart)) return false;
     best = std::move(even);
     return true;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -51,15 +52,14 @@ void bound_errors(std::vector<TradeoffRow>& rows) {
 }
 
 std::vector<bool> pareto_front(const std::vector<double>& cost, const std::vector<double>& error) {
-  const auto beats = [&](std::size_t j, std::size_t i) {
-    if (!std::isfinite(cost[j]) || !(cost[j] <= cost[i] && error[j] <= error[i])) return false;
-    return cost[j] < cost[i] || error[j] < error[i] || j < i;
-  };
-  std::vector<bool> front;
-  for (std::size_t i = 0; i < cost.size(); ++i) {
-    front.push_back(std::isfinite(cost[i]) && std::isfinite(error[i]));
-    for (std::size_t j = 0; j < cost.size() && front[i]; ++j) front[i] = !beats(j, i);
-  }
+  std::vector<std::size_t> finite;
+  for (std::size_t i = 0; i < cost.size(); ++i)
+    if (std::isfinite(cost[i]) && std::isfinite(error[i])) finite.push_back(i);
+  std::ranges::stable_sort(finite, {}, [&](std::size_t i) { return std::pair(cost[i], error[i]); });
+  std::vector<bool> front(cost.size(), false);
+  double least = std::numeric_limits<double>::infinity();  // error of what costs no more
+  for (const std::size_t i : finite)
+    if (error[i] < least) front[i] = true, least = error[i];
   return front;
 }
 
