@@ -12,8 +12,7 @@
 #include "app/results/objective_units.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "core/start/linearisation.hpp"
-#include "optim/tradeoff/penalty_study.hpp"
-#include "optim/tradeoff/tradeoff_table.hpp"
+#include "optim/tradeoff/tradeoff.hpp"
 
 namespace mbsopt::inline app {
 

@@ -14,7 +14,6 @@
 #include "app/results/tradeoff_results.hpp"
 #include "app/run/provenance.hpp"
 #include "core/tableau/tableaus.hpp"
-#include "optim/tradeoff/penalty_study.hpp"
 #include "optim/tradeoff/tradeoff.hpp"
 #include "optim/tradeoff/tradeoff_table.hpp"
 

@@ -3,7 +3,6 @@
 
 #include <string>
 
-#include "optim/tradeoff/penalty_study.hpp"
 #include "optim/tradeoff/tradeoff.hpp"
 
 namespace mbsopt::inline app {

@@ -5,7 +5,7 @@
 
 #include "app/run/run.hpp"
 #include "optim/tradeoff/advice.hpp"
-#include "optim/tradeoff/penalty_study.hpp"
+#include "optim/tradeoff/tradeoff.hpp"
 
 namespace mbsopt::inline app {
 

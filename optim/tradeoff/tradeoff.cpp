@@ -1,17 +1,24 @@
 #include "optim/tradeoff/tradeoff.hpp"
 
+#include <fast_float/fast_float.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <sstream>
+#include <stdexcept>
 
 #include "core/cvodes/cvodes.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 #include "core/tableau/tableaus.hpp"
+#include "optim/machine/median.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
+
+using Eigen::Index;
 
 // Settings from loose to tight, and the number of those measured.
 struct Curve {
@@ -22,18 +29,33 @@ struct Curve {
   double expected() const { return last_seconds * growth; }  // of the next
 };
 
-// 10^-from, ..., 10^-to
-std::vector<double> decades(int from, int to, int stride = 1) {
-  std::vector<double> values;
-  for (int k = from; k <= to; k += stride) values.push_back(std::pow(10.0, -k));
-  return values;
+// rtol from 10^-first to 10^-last
+Curve curve_of(const std::string& name, const SimulationSettings& base, const std::string& integrator, int first,
+               int last, int stride = 1, std::optional<GradientMethod> method = {}) {
+  Curve curve;
+  for (int k = first; k <= last; k += stride)
+    curve.settings.push_back({name, with_tolerance(base, integrator, std::pow(10.0, -k)), method});
+  return curve;
 }
 
-class Sweep : TradeoffMeasurement {
- public:
-  using TradeoffMeasurement::TradeoffMeasurement;
+double largest_relative_error(const Eigen::MatrixXd& of, const Eigen::MatrixXd& against) {
+  double largest = 0;
+  for (Index i = 0; i < of.cols(); ++i) {
+    const double size = against.col(i).cwiseAbs().maxCoeff();
+    const double error = (of.col(i) - against.col(i)).cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
+    if (!std::isfinite(error)) return kNaN;
+    if (size > 0) largest = std::max(largest, error / size);
+  }
+  return largest;
+}
 
-  Tradeoff run() {
+// Finds the reference, measures rows, and times them again. The two studies choose the settings.
+class Sweep {
+ public:
+  Sweep(const Scene& scene, const std::vector<Objective>& objectives, const TradeoffOptions& options)
+      : runs_(scene, objectives), options_(options), stopwatch_(options.clock) {}
+
+  Tradeoff study_speed() {
     if (!find_reference(true)) return finish();
     measure_given_settings();
     budget_.emplace(options_.clock);
@@ -48,9 +70,108 @@ class Sweep : TradeoffMeasurement {
     return finish();
   }
 
+  PenaltyStudy study_penalty(const std::vector<double>& alphas) {
+    constexpr int kRounds = 3;
+    PenaltyStudy study;
+    if (find_reference(false) && !interrupted()) {
+      choose_settings(study);
+      // Each alpha has three runs and their repetitions.
+      const double seconds = std::max(1.0, options_.budget_seconds / (5 * static_cast<double>(alphas.size() + 1)));
+      measure(penalty_setting(study, "augmented Lagrangian", constrained(own().formulation)), seconds);
+      FormulationSettings exact;  // solves to rounding; its alpha is none of the study's
+      exact.alpha = 3e7, exact.tolerance = 1e-15;
+      const Eigen::MatrixXd exact_accelerations = accelerations(exact);
+      for (const double alpha : alphas) {
+        if (interrupted()) break;
+        add_penalty_row(study, alpha, exact_accelerations, seconds);
+        report("alpha", static_cast<double>(study.rows.size()) / static_cast<double>(alphas.size()));
+      }
+      time_again(kRounds);
+    }
+    study.table = finish();
+    return study;
+  }
+
  private:
   const SimulationSettings& own() const { return runs_.scene().simulation; }
   bool has_gradients() const { return !result_.reference.gradients_by.empty(); }
+  bool interrupted() const { return options_.interrupted && options_.interrupted(); }
+  double budget_left() const { return options_.budget_seconds - budget_->seconds(); }  // without the reference
+  RunLimit within(double seconds) const { return {seconds, options_.interrupted, options_.clock}; }
+  void report(const std::string& doing, double done) const {
+    if (options_.progress) options_.progress(doing, std::clamp(done, 0.0, 1.0));
+  }
+
+  bool find_reference(bool gradients) {
+    report("reference", 0);
+    result_.reference = converged_reference(
+        runs_, {.seconds_per_run = std::max(10.0, options_.budget_seconds / 6),
+                .gradients = gradients,
+                .interrupted = options_.interrupted,
+                .clock = options_.clock,
+                .progress = [this](const std::string& doing, double done) { report("reference, " + doing, done); }});
+    result_.message = result_.reference.message;
+    budget_.emplace(options_.clock);
+    return result_.ok();
+  }
+
+  Answer timed(const TradeoffSetting& setting, double seconds) const {
+    return setting.gradient ? runs_.gradients(setting.simulation, *setting.gradient, within(seconds))
+                            : runs_.values(setting.simulation, within(seconds));
+  }
+
+  TradeoffRow& add_row(const TradeoffSetting& setting, const Answer& answer, RowStatus status,
+                       const std::string& message) {
+    TradeoffRow& row = result_.rows.emplace_back();
+    row.setting = setting, row.status = status, row.message = message;
+    row.errors = result_.reference.errors->of(answer);
+    row.deviations = result_.reference.errors->deviations(answer);
+    return row;
+  }
+
+  // Adds a row and returns its answer. A simulation is timed by a run without samples.
+  Answer measure(const TradeoffSetting& setting, double seconds) {
+    Answer answer = timed(setting, seconds);
+    const SimulationStatistics statistics = answer.statistics;
+    const double wall_seconds = answer.wall_seconds;
+    if (answer.ok && !setting.gradient) answer = runs_.motion(setting.simulation, within(3 * seconds));
+    if (setting.gradient) answer.psi.resize(0);  // its objectives are those of the simulation, which has its own row
+    const bool stopped = interrupted() && !answer.ok, abandoned = stopped || answer.out_of_time;
+    TradeoffRow& row = add_row(setting, answer,
+                               answer.ok   ? RowStatus::ok
+                               : abandoned ? RowStatus::abandoned
+                                           : RowStatus::failed,
+                               stopped ? "interrupted" : answer.message);
+    row.statistics = statistics, row.wall_seconds = wall_seconds;
+    row.within_floor = answer.ok;
+    Index q = 0;
+    for (const Quantity& quantity : result_.quantities())
+      if (row.errors(q++) > quantity.certificate) row.within_floor = false;
+    if (answer.ok) row.runs = {row.wall_seconds};
+    if (answer.ok && row.errors.array().isInf().any()) row.status = RowStatus::failed, row.message = "not finite";
+    return answer;
+  }
+
+  void time_again(int rounds) {  // within the budget
+    for (int round = 1; round < rounds; ++round) {
+      for (TradeoffRow& row : result_.rows) {
+        if (interrupted()) return;
+        if (!row.ok() || row.wall_seconds > budget_left()) continue;
+        const Answer answer = timed(row.setting, 10 * row.wall_seconds + 1);
+        if (answer.ok) row.runs.push_back(answer.wall_seconds);
+        row.wall_seconds = median(row.runs);
+      }
+      report("timing again", static_cast<double>(round) / (rounds - 1));
+    }
+  }
+
+  Tradeoff finish() {
+    result_.interrupted = interrupted() || result_.reference.interrupted;
+    result_.wall_seconds = stopwatch_.seconds();
+    bound_errors(result_.rows);
+    if (result_.ok()) mark_fronts(result_.rows, result_.quantities());
+    return std::move(result_);
+  }
 
   // Measures the settings of the file, and the defaults, with a gradient if there is one.
   void measure_given_settings() {
@@ -80,18 +201,11 @@ class Sweep : TradeoffMeasurement {
     if (s.max_step == with_defaults(own()).integrator.max_step) s.max_step.reset();
     return settings;
   }
-  SimulationSettings swept() const { return swept(constrained(own().formulation)); }
-
-  Curve curve_of(const std::string& name, const SimulationSettings& base, const std::string& integrator,
-                 const std::vector<double>& rtols, std::optional<GradientMethod> method = {}) const {
-    Curve curve;
-    for (const double rtol : rtols) curve.settings.push_back({name, with_tolerance(base, integrator, rtol), method});
-    return curve;
-  }
 
   std::vector<Curve> simulation_curves() const {
+    const SimulationSettings base = swept(constrained(own().formulation));
     std::vector<Curve> curves;
-    const auto add = [&](const std::string& name) { curves.push_back(curve_of(name, swept(), name, decades(2, 11))); };
+    const auto add = [&](const std::string& name) { curves.push_back(curve_of(name, base, name, 2, 11)); };
     for (const Method& method : runge_kutta_methods()) {
       const std::string name(method.name);
       if (method.adaptive) {
@@ -100,11 +214,10 @@ class Sweep : TradeoffMeasurement {
       }
       Curve& steps = curves.emplace_back();
       for (double count = 32; count <= 1 << 15; count *= 2) {
-        SimulationSettings settings = swept();
+        SimulationSettings& settings = steps.settings.emplace_back(TradeoffSetting{name, base, {}}).simulation;
         settings.integrator.type = name;
         settings.integrator.options = {};
         settings.integrator.step = (own().end_time - own().start_time) / count;
-        steps.settings.push_back({name, settings, {}});
       }
     }
     if (own().events.empty()) add("cvodes_adams"), add("cvodes_bdf");
@@ -115,30 +228,31 @@ class Sweep : TradeoffMeasurement {
   // depend on chance, but the time does.
   bool stiff() const {
     const auto evaluations = [&](const char* integrator) {
-      const auto row = std::ranges::find_if(result_.rows, [&](const TradeoffRow& r) {
-        return r.ok() && r.setting.curve == integrator &&
-               std::abs(r.setting.simulation.integrator.rtol - 1e-4) < 1e-6;  // usual
-      });
-      return row == result_.rows.end() ? std::numeric_limits<double>::infinity()
-                                       : static_cast<double>(row->statistics.rhs_evaluations);
+      for (const TradeoffRow& r : result_.rows) {
+        const bool is_usual = std::abs(r.setting.simulation.integrator.rtol - 1e-4) < 1e-6;
+        if (r.ok() && r.setting.curve == integrator && is_usual)
+          return static_cast<double>(r.statistics.rhs_evaluations);
+      }
+      return std::numeric_limits<double>::infinity();
     };
     return 2 * evaluations("radau5") < evaluations("dopri5");
   }
 
   std::vector<Curve> gradient_curves() const {
+    const SimulationSettings base = swept(constrained(own().formulation));
     std::vector<Curve> curves;
-    const auto add = [&](GradientMethod method, const char* integrator) {
+    const auto add = [&](GradientMethod method, const std::string& integrator) {
       curves.push_back(
-          curve_of(fmt::format("{}, {}", to_string(method), integrator), swept(), integrator, decades(3, 10), method));
+          curve_of(fmt::format("{}, {}", to_string(method), integrator), base, integrator, 3, 10, 1, method));
     };
     const bool is_stiff = stiff();
     const char *first = is_stiff ? "radau5" : "dopri5", *second = is_stiff ? "sdirk4" : "dopri853";
     for (const char* integrator : {first, second})
-      add(GradientMethod::adjoint, integrator), add(GradientMethod::tlm, integrator);
+      for (const auto method : {GradientMethod::adjoint, GradientMethod::tlm}) add(method, integrator);
     add(GradientMethod::differences, first);
-    if (!own().events.empty()) return curves;
-    for (const GradientMethod method : {GradientMethod::cvodes_forward, GradientMethod::cvodes_adjoint})
-      add(method, is_stiff ? "cvodes_bdf" : "cvodes_adams");
+    if (own().events.empty())
+      for (const GradientMethod method : {GradientMethod::cvodes_forward, GradientMethod::cvodes_adjoint})
+        add(method, is_stiff ? "cvodes_bdf" : "cvodes_adams");
     return curves;
   }
 
@@ -147,7 +261,7 @@ class Sweep : TradeoffMeasurement {
     const std::string integrator = stiff() ? "radau5" : "dopri5";
     std::vector<Curve> curves;
     const auto add = [&](const std::string& name, const FormulationSettings& formulation) {
-      curves.push_back(curve_of(name + ": " + integrator, swept(formulation), integrator, decades(3, 9, 2)));
+      curves.push_back(curve_of(name + ": " + integrator, swept(formulation), integrator, 3, 9, 2));
     };
     FormulationSettings penalty = FormulationSettings::penalty();
     for (const bool cholesky : {false, true}) {
@@ -180,7 +294,15 @@ class Sweep : TradeoffMeasurement {
 
   void advance(Curve& curve, bool spent) {
     const double most = options_.budget_seconds / 30, expected = curve.expected();
-    if (spent || expected > most) return skip(curve, spent);
+    if (spent || expected > most) {
+      const bool is_last = curve.next + 1 == curve.settings.size();
+      const std::string why =
+          spent ? fmt::format("the budget of {:g} s was spent", options_.budget_seconds)
+                : fmt::format("would take about {:.2g} s, more than its share of the budget", expected);
+      add_row(curve.settings[curve.next], {}, RowStatus::skipped, why + (is_last ? "" : "; so were the tighter ones"));
+      curve.next = curve.settings.size();
+      return;
+    }
     measure(curve.settings[curve.next++], 2 * most);
     const TradeoffRow& row = result_.rows.back();
     if (row.status == RowStatus::abandoned || row.within_floor) curve.next = curve.settings.size();
@@ -189,23 +311,98 @@ class Sweep : TradeoffMeasurement {
     curve.last_seconds = row.wall_seconds;
   }
 
-  void skip(Curve& curve, bool spent) {
-    TradeoffRow& row = result_.rows.emplace_back();
-    row.setting = curve.settings[curve.next];
-    row.status = RowStatus::skipped;
-    row.message = spent ? fmt::format("the budget of {:g} s was spent", options_.budget_seconds)
-                        : fmt::format("would take about {:.2g} s, more than its share of the budget", curve.expected());
-    if (curve.next + 1 < curve.settings.size()) row.message += "; so were the tighter ones";
-    row.errors.setConstant(static_cast<Eigen::Index>(result_.quantities().size()), kNaN), row.deviations = row.errors;
-    curve.next = curve.settings.size();
+  void choose_settings(PenaltyStudy& study) const {
+    constexpr double kRtol = 1e-9;
+    const bool is_penalty = own().formulation.type == FormulationType::penalty;
+    study.formulation = is_penalty ? own().formulation : FormulationSettings::penalty();
+    // Takes the explicit method, unless stiffness excluded it from the reference.
+    const TradeoffReference& r = result_.reference;
+    const bool is_explicit = r.first.integrator == "dopri853" || r.second.integrator == "dopri853";
+    study.integrator = with_tolerance(own(), is_explicit ? "dopri853" : "radau5", kRtol).integrator;
   }
+
+  TradeoffSetting penalty_setting(const PenaltyStudy& study, const char* curve,
+                                  const FormulationSettings& formulation) const {
+    TradeoffSetting setting{curve, own(), {}};
+    setting.simulation.integrator = study.integrator, setting.simulation.formulation = formulation;
+    return setting;
+  }
+
+  // Accelerations at the states of the right motion, one column each; a column of NaN if they cannot be computed.
+  Eigen::MatrixXd accelerations(const FormulationSettings& formulation) const {
+    const SampledMotion& motion = result_.reference.errors->exact().motion;
+    SpatialDynamics dynamics(runs_.mechanism(), formulation);
+    Eigen::VectorXd ydot(motion.states.rows());
+    Eigen::MatrixXd a(ydot.size() / 2, motion.states.cols());
+    for (Index i = 0; i < a.cols(); ++i) {
+      const double t = motion.times[static_cast<std::size_t>(i)];
+      if (!dynamics.evaluate(t, motion.states.col(i), motion.angles.col(i), ydot)) ydot.setConstant(kNaN);
+      a.col(i) = ydot.tail(a.rows());
+    }
+    return a;
+  }
+
+  void add_penalty_row(PenaltyStudy& study, double alpha, const Eigen::MatrixXd& exact, double seconds) {
+    PenaltyStudyRow& row = study.rows.emplace_back();
+    row.alpha = alpha;
+    FormulationSettings quasidefinite = study.formulation, augmented;
+    quasidefinite.alpha = augmented.alpha = alpha;
+    augmented.iterations = 3;
+    FormulationSettings cholesky = quasidefinite;
+    quasidefinite.linear_solver = LinearSolver::quasidefinite, cholesky.linear_solver = LinearSolver::cholesky;
+    const Eigen::MatrixXd a = accelerations(quasidefinite);
+    row.model_error = largest_relative_error(a, exact);
+    row.rounding_error = largest_relative_error(accelerations(cholesky), a);
+    row.augmented_error = largest_relative_error(accelerations(augmented), exact);
+
+    row.quasidefinite = result_.rows.size(), row.cholesky = row.quasidefinite + 1;
+    const TradeoffSetting by_cholesky = penalty_setting(study, "penalty", cholesky);
+    const Answer quasi = measure(penalty_setting(study, "penalty", quasidefinite), seconds);
+    measure(by_cholesky, seconds);
+    Answer frozen;
+    if (quasi.ok) frozen = runs_.motion(by_cholesky.simulation, within(3 * seconds), &quasi.steps);
+    row.rounding = result_.reference.errors->of(frozen, quasi);
+  }
+
+  const TradeoffRuns runs_;
+  const TradeoffOptions& options_;
+  const Stopwatch stopwatch_;
+  std::optional<Stopwatch> budget_;
+  Tradeoff result_;
 };
 
 }  // namespace
 
 Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,
                           const TradeoffOptions& options) {
-  return Sweep(scene, objectives, options).run();
+  return Sweep(scene, objectives, options).study_speed();
+}
+
+PenaltyStudy study_penalty(const Scene& scene, const std::vector<Objective>& objectives,
+                           const std::vector<double>& alphas, const TradeoffOptions& options) {
+  return Sweep(scene, objectives, options).study_penalty(alphas);
+}
+
+std::vector<double> alphas_of(const std::string& text) {
+  const char separator = text.find(':') == std::string::npos ? ',' : ':';
+  std::vector<double> alphas;
+  std::istringstream parts(text + separator);
+  for (std::string part; std::getline(parts, part, separator);) {
+    double& alpha = alphas.emplace_back();
+    const auto [end, error] = fast_float::from_chars(part.data(), part.data() + part.size(), alpha);
+    if (error != std::errc() || end != part.data() + part.size() || !(alpha > 0) || !std::isfinite(alpha))
+      throw std::invalid_argument(fmt::format(
+          "--alpha {}: '{}' is not a positive number; allowed: 1e2:1e16 (powers of ten), or a list as 1e5,1e7", text,
+          part));
+  }
+  if (separator == ',') return alphas;
+  const double low = alphas.front(), high = alphas.back();
+  if (alphas.size() > 2) throw std::invalid_argument(fmt::format("--alpha {}: a range has two ends", text));
+  if (low > high) throw std::invalid_argument(fmt::format("--alpha {}: the first must not be larger", text));
+  if (high / low > 1e40) throw std::invalid_argument(fmt::format("--alpha {}: more than 40 powers of ten", text));
+  alphas.clear();
+  for (int k = 0; low * std::pow(10, k) <= high * (1 + 1e-9); ++k) alphas.push_back(low * std::pow(10, k));
+  return alphas;
 }
 
 }  // namespace mbsopt::inline optim
