@@ -4,7 +4,6 @@
 #include "app/results/accuracy_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/optimized_problem.hpp"
-#include "app/results/tradeoff_csv.hpp"
 #include "app/results/tradeoff_results.hpp"
 #include "app/run/command.hpp"
 #include "app/run/provenance.hpp"
@@ -17,11 +16,9 @@ namespace mbsopt::inline app {
 namespace {
 
 TradeoffOptions options_of(Run& run) {
-  TradeoffOptions options;
-  options.budget_seconds = run.context.options.budget;
-  options.interrupted = [] { return interrupted(); };
-  options.progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); };
-  return options;
+  return {.budget_seconds = run.context.options.budget,
+          .interrupted = [] { return interrupted(); },
+          .progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); }};
 }
 
 // Adds the reference and the table, or why there is none. Returns whether there is one.
@@ -58,8 +55,7 @@ void sweep(Run& run) {
     add_fit_errors(run, fit.emplace(cut.problem, cut.data, options.interrupted));
   TaskAdviser adviser(problem, tradeoff, fit ? &*fit : nullptr, kFits * options.budget_seconds);
   if (options.budget_seconds > 0) {
-    add_recommendations(run, tradeoff);
-    if (!tradeoff.interrupted && (problem.design || fit)) add_task_recommendations(run, tradeoff, adviser);
+    add_recommendations(run, tradeoff, !tradeoff.interrupted && (problem.design || fit) ? &adviser : nullptr);
     add_outcomes(run, tradeoff);
   }
   if (tradeoff.interrupted) {

@@ -1,10 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <functional>
 #include <optional>
-#include <tuple>
+#include <string_view>
 #include <utility>
 
 #include "app/report/line_plot.hpp"
@@ -15,7 +14,6 @@
 #include "app/run/provenance.hpp"
 #include "core/tableau/tableaus.hpp"
 #include "optim/tradeoff/tradeoff.hpp"
-#include "optim/tradeoff/tradeoff_table.hpp"
 
 namespace mbsopt::inline app {
 namespace {
@@ -34,14 +32,14 @@ void add_reference(HtmlPage& page, const Json& result, const TradeoffReference& 
                                fmt::join(others.get<std::vector<std::string>>(), ", ")));
 }
 
-// The plot that a curve belongs to.
-enum class Group { explicit_methods, implicit_methods, formulations, gradients };
+// What a plot shows: the curves of a quantity for one group of methods.
+constexpr std::string_view kExplicit = "explicit methods", kImplicit = "implicit and multistep methods",
+                           kFormulation = "formulations", kGradient = "gradient methods";
 
-Group group_of(const TradeoffSetting& setting) {
-  if (setting.gradient) return Group::gradients;
-  const Method* method = runge_kutta_method(setting.simulation.integrator.type);
-  if (setting.curve != setting.simulation.integrator.type) return Group::formulations;
-  return method && !method->implicit() ? Group::explicit_methods : Group::implicit_methods;
+std::string_view group_of(const TradeoffSetting& setting) {
+  if (setting.gradient) return kGradient;
+  if (setting.curve != setting.simulation.integrator.type) return kFormulation;
+  return explicit_method(setting.curve) ? kExplicit : kImplicit;
 }
 
 constexpr std::size_t kInk = 7;  // the colour of the style that is grey
@@ -59,12 +57,12 @@ std::string unit_of_error(const Quantity& q, const ObjectiveUnits& units) {
 
 // Draws lines through bounds. It draws points for errors below their bound, and for settings that a tighter one
 // dominates.
-LinePlot work_precision(const Tradeoff& tradeoff, const ObjectiveUnits& units, std::size_t quantity, Group group,
-                        const char* methods) {
+LinePlot work_precision(const Tradeoff& tradeoff, const ObjectiveUnits& units, std::size_t quantity,
+                        std::string_view group) {
   const std::vector<TradeoffRow>& rows = tradeoff.rows;
   const Quantity& q = tradeoff.quantities()[quantity];
   const auto column = static_cast<Eigen::Index>(quantity);
-  LinePlot plot{.title = q.name + ": " + methods,
+  LinePlot plot{.title = fmt::format("{}: {}", q.name, group),
                 .x_label = "time [s]",
                 .y_label = fmt::format("{} error of {} [{}]", q.relative ? "relative" : "absolute", q.name,
                                        unit_of_error(q, units)),
@@ -123,17 +121,13 @@ std::string sentence_of(const Json& result, const Tradeoff& tradeoff, std::size_
 }
 
 void add_plots(HtmlPage& page, const Json& result, const Tradeoff& tradeoff, const ObjectiveUnits& units) {
-  constexpr std::array kPlots{std::pair{Group::explicit_methods, "explicit methods"},
-                              std::pair{Group::implicit_methods, "implicit and multistep methods"},
-                              std::pair{Group::formulations, "formulations"},
-                              std::pair{Group::gradients, "gradient methods"}};
   bool any = false;
   for (std::size_t q = 0; q < tradeoff.quantities().size(); ++q) {
-    for (const auto& [group, methods] : kPlots) {
-      const LinePlot plot = work_precision(tradeoff, units, q, group, methods);
+    for (const std::string_view group : {kExplicit, kImplicit, kFormulation, kGradient}) {
+      const LinePlot plot = work_precision(tradeoff, units, q, group);
       if (plot.series.empty()) continue;
       if (!std::exchange(any, true)) page.heading("Error over time"), page.begin_choices({"error of", "with"});
-      page.begin_choice({tradeoff.quantities()[q].name, methods});
+      page.begin_choice({tradeoff.quantities()[q].name, std::string(group)});
       page.paragraph(sentence_of(result, tradeoff, q));
       page.plot(plot);
       page.end_choice();
@@ -163,22 +157,17 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
   for (const Quantity& q : quantities) header.push_back(q.name);
   std::vector<TableRow> rows, without;  // without: settings that have no result
   for (const TradeoffRow& r : tradeoff.rows) {
+    const Json columns = columns_of(r, quantities);
     if (!r.ok()) {
-      without.push_back({in_words(r.setting), std::string(to_string(r.status)), r.message});
+      without.push_back({in_words(r.setting), cell(columns.at("status")), r.message});
       continue;
     }
-    TableRow row{in_words(r.setting),
-                 fmt::format("{:.3g}", 1e3 * r.wall_seconds),
-                 std::to_string(r.runs.size()),
-                 std::to_string(r.statistics.steps),
-                 std::to_string(r.statistics.rhs_evaluations),
-                 std::to_string(r.statistics.factorisations)};
-    for (std::size_t q = 0; q < quantities.size(); ++q) {
-      const bool front = q < r.pareto.size() && r.pareto[q];
-      const auto column = static_cast<Eigen::Index>(q);
-      row.push_back(error_text(r.errors(column), quantities[q].certificate) + (front ? " *" : ""));
-    }
-    rows.push_back(std::move(row));
+    TableRow& row = rows.emplace_back(TableRow{in_words(r.setting), fmt::format("{:.3g}", 1e3 * r.wall_seconds)});
+    for (const char* count : {"repetitions", "steps", "rhs_evaluations", "factorisations"})
+      row.push_back(columns.at(count).dump());
+    for (std::size_t q = 0; q < quantities.size(); ++q)
+      row.push_back(error_text(r.errors(static_cast<Eigen::Index>(q)), quantities[q].certificate) +
+                    (r.pareto[q] ? " *" : ""));
   }
   page.table(header, rows);
   page.paragraph(
@@ -215,49 +204,57 @@ std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff, const 
 
 std::string penalty_report(const Json& result, const PenaltyStudy& study) {
   HtmlPage page(report_title(result));
-  using OverAlpha = std::tuple<const char*, std::function<double(const PenaltyStudyRow&)>, Mark>;
+  struct OverAlpha {
+    std::string name;
+    std::function<double(const PenaltyStudyRow&)> value_of;
+    Mark mark = Mark::line;
+  };
   const auto add_plot = [&](const std::string& title, const std::string& label, const std::vector<OverAlpha>& curves) {
     LinePlot plot{
         .title = title, .x_label = "alpha [-]", .y_label = label, .logarithmic_y = true, .logarithmic_x = true};
-    for (const auto& [name, value_of, mark] : curves) {
-      PlotSeries& series = plot.series.emplace_back(PlotSeries{name, {}, {}, mark});
-      for (const PenaltyStudyRow& row : study.rows) series.x.push_back(row.alpha), series.y.push_back(value_of(row));
+    for (const OverAlpha& curve : curves) {
+      PlotSeries& series = plot.series.emplace_back(PlotSeries{curve.name, {}, {}, curve.mark});
+      for (const PenaltyStudyRow& row : study.rows)
+        series.x.push_back(row.alpha), series.y.push_back(curve.value_of(row));
     }
     page.plot(plot);
   };
   add_status(page, result);
   add_machine(page, result);
   page.heading("Accelerations");
-  add_plot("Relative error of accelerations", "relative error [-]",
-           {{"penalty against the constrained equations", &PenaltyStudyRow::model_error, Mark::line},
-            {"rounding by Cholesky", &PenaltyStudyRow::rounding_error, Mark::line},
-            {"augmented Lagrangian", &PenaltyStudyRow::augmented_error, Mark::dashed}});
+  std::vector<std::string> header{"alpha"};
+  std::vector<OverAlpha> of_accelerations;
+  for (const AccelerationError& e : kAccelerationErrors) {
+    header.push_back(e.words);
+    const bool is_penalty = e.value != &PenaltyStudyRow::augmented_error;
+    of_accelerations.push_back({e.legend, e.value, is_penalty ? Mark::line : Mark::dashed});
+  }
+  add_plot("Relative error of accelerations", "relative error [-]", of_accelerations);
   std::vector<TableRow> rows, runs;
   for (const PenaltyStudyRow& row : study.rows) {
     const std::string alpha = fmt::format("{:.0e}", row.alpha);
-    rows.push_back(
-        {alpha, error_text(row.model_error), error_text(row.rounding_error), error_text(row.augmented_error)});
-    for (const auto& [name, i] : {std::pair{"quasi-definite", row.quasidefinite}, {"cholesky", row.cholesky}}) {
-      const TradeoffRow& r = study.table.rows[i];
-      runs.push_back({alpha, name, std::to_string(r.statistics.rhs_evaluations),
+    TableRow& cells = rows.emplace_back(TableRow{alpha});
+    for (const AccelerationError& e : kAccelerationErrors) cells.push_back(error_text(row.*e.value));
+    for (const PenaltyRun& solver : kPenaltyRuns) {
+      const TradeoffRow& r = study.table.rows[row.*solver.row];
+      runs.push_back({alpha, solver.words, std::to_string(r.statistics.rhs_evaluations),
                       r.ok() ? fmt::format("{:.3g}", r.wall_seconds) : "-",
                       r.ok() ? error_text(r.statistics.max_position_violation) : "-", r.ok() ? "ok" : r.message});
     }
   }
-  page.table({"alpha", "model error", "rounding by Cholesky", "augmented Lagrangian"}, rows);
+  page.table(header, rows);
   page.heading("Runs");
   page.paragraph(fmt::format("{} at rtol {:g}; xi {:g}, omega {:g}.", study.integrator.type, study.integrator.rtol,
                              study.formulation.xi, study.formulation.omega));
   Eigen::Index column = 0;
   for (const Quantity& q : study.table.quantities()) {
-    const auto errors_of = [&](std::size_t PenaltyStudyRow::*run) {
-      return [&, run, column](const PenaltyStudyRow& row) { return study.table.rows[row.*run].errors(column); };
-    };
-    add_plot(
-        "Error of " + q.name, fmt::format("error of {} [{}]", q.name, q.relative ? "-" : kUnknownUnit),
-        {{"quasi-definite", errors_of(&PenaltyStudyRow::quasidefinite), Mark::line},
-         {"cholesky", errors_of(&PenaltyStudyRow::cholesky), Mark::line},
-         {"rounding by Cholesky on equal steps", [&](const auto& row) { return row.rounding(column); }, Mark::dashed}});
+    std::vector<OverAlpha> curves;
+    for (const PenaltyRun& solver : kPenaltyRuns)
+      curves.push_back(
+          {solver.words, [&](const PenaltyStudyRow& row) { return study.table.rows[row.*solver.row].errors(column); }});
+    curves.push_back({"rounding by Cholesky on equal steps",
+                      [&](const PenaltyStudyRow& row) { return row.rounding(column); }, Mark::dashed});
+    add_plot("Error of " + q.name, fmt::format("error of {} [{}]", q.name, q.relative ? "-" : kUnknownUnit), curves);
     ++column;
   }
   page.table({"alpha", "solver", "right-hand sides", "time [s]", "drift", "outcome"}, runs);

@@ -1,4 +1,4 @@
-#include "app/results/tradeoff_csv.hpp"
+#include "app/results/tradeoff_results.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "optim/tradeoff/tradeoff_table.hpp"
 #include "tests/optim/counted_clock.hpp"
 #include "tests/optim/pendulum.hpp"
 
