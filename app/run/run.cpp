@@ -21,24 +21,11 @@
 namespace mbsopt::inline app {
 namespace {
 
-struct StatusRow {
-  const char* word;  // in result.json
-  int exit_code;
-};
-StatusRow row_of(RunStatus status) {
-  switch (status) {
-    case RunStatus::failed:
-      return {"failed", kNumericalFailure};
-    case RunStatus::disagrees:
-      return {"disagrees", kCheckFailed};
-    case RunStatus::interrupted:
-      return {"interrupted", kInterrupted};
-    case RunStatus::running:
-      return {"running", kDone};
-    case RunStatus::ok:
-      break;
-  }
-  return {"ok", kDone};
+int exit_code_of(const Json& status) {
+  return status == "failed"        ? kNumericalFailure
+         : status == "disagrees"   ? kCheckFailed
+         : status == "interrupted" ? kInterrupted
+                                   : kDone;
 }
 
 Problem problem_of(const CommandContext& context, std::vector<std::string>& warnings) {
@@ -120,7 +107,7 @@ Run::~Run() {
   if (!running_) return;
   try {
     progress.finish();
-    set(RunStatus::failed);
+    result["status"] = "failed";
     const std::string text = result_json_text(result);
     if (context.json) *context.json << text;
     write("result.json", text);
@@ -131,14 +118,9 @@ Run::~Run() {
 
 void Run::start() {
   lock_ = folder.claim();
-  set(RunStatus::running);
+  result["status"] = "running";
   folder.write("result.json", result_json_text(result));
   running_ = true;
-}
-
-void Run::set(RunStatus status) {
-  status_ = status;
-  result["status"] = row_of(status).word;
 }
 
 void Run::write(const std::string& file, std::string_view content) {
@@ -171,15 +153,15 @@ void Run::warn(const std::vector<std::string>& all) {
 }
 
 void Run::failed(const std::string& message, std::optional<double> last_good_time) {
-  set(RunStatus::failed);
+  result["status"] = "failed";
   result["message"] = message;
   if (last_good_time) result["last_good_time"] = *last_good_time;
 }
 
-void Run::disagrees() { set(RunStatus::disagrees); }
+void Run::disagrees() { result["status"] = "disagrees"; }
 
 void Run::stopped(const std::string& kept) {
-  set(RunStatus::interrupted);
+  result["status"] = "interrupted";
   result["message"] = "interrupted; " + kept;
 }
 
@@ -189,17 +171,17 @@ void Run::broke_off(const std::string& kept, const std::string& message, std::op
 
 int Run::finish() {
   progress.finish();
-  if (status_ == RunStatus::running) set(RunStatus::ok);
+  Json& status = result["status"];
+  if (status == "running") status = "ok";
   const std::string message = result.value("message", "");
-  if (status_ == RunStatus::interrupted) context.err << message << '\n';
-  if (status_ == RunStatus::failed && !message.empty())
-    context.err << fmt::format("{} failed: {}\n", context.command, message);
+  if (status == "interrupted") context.err << message << '\n';
+  if (status == "failed" && !message.empty()) context.err << fmt::format("{} failed: {}\n", context.command, message);
   const std::string text = result_json_text(result);
   write("result.json", text);
   if (context.json) *context.json << text;
   running_ = false;
   context.out << fmt::format("\n{}: {}\n", (folder.path() / "").string(), fmt::join(written_, " "));
-  return row_of(status_).exit_code;
+  return exit_code_of(result["status"]);
 }
 
 bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, bool integrated) {

@@ -28,8 +28,6 @@
 
 namespace mbsopt::inline app {
 
-enum class RunStatus { running, ok, failed, disagrees, interrupted };
-
 class Run {
  public:
   explicit Run(const CommandContext& context);
@@ -43,7 +41,7 @@ class Run {
   const CommandContext& context;
   const Problem& problem = problem_;
   const OutputFolder folder;
-  Json result;  // the parts of result.json
+  Json result;  // the parts of result.json; "status" is how the run ends
   Progress progress;
 
   void start();  // claims the folder: locks it, and writes result.json with "status": "running"
@@ -72,9 +70,7 @@ class Run {
  private:
   std::unique_ptr<FolderLock> lock_;
   std::vector<std::string> written_;
-  void set(RunStatus status);
-  RunStatus status_ = RunStatus::running;
-  bool running_ = false;
+  bool running_ = false;  // result.json says so
 };
 
 ReadOptions read_options(const CommandContext& context);
