@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/parameter_values.hpp"
@@ -16,13 +18,18 @@ namespace {
 
 constexpr std::size_t kMostPoints = 10'000'000;  // of a grid: more is an input error, and fills the memory
 
+template <class... Arguments>
+[[noreturn]] void refuse(fmt::format_string<Arguments...> words, Arguments&&... arguments) {
+  throw std::invalid_argument(fmt::format(words, std::forward<Arguments>(arguments)...));
+}
+
 int parameter_index(const Scene& scene, const std::string& name) { return parameter_indices(scene, {name}).front(); }
 
 double number_in(const std::string& text, const std::string& option) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
-    throw std::invalid_argument(fmt::format("--vary {}: '{}' is not a number", option, text));
+    refuse("--vary {}: '{}' is not a number", option, text);
   return value;
 }
 
@@ -33,32 +40,23 @@ struct VariedRange {
 };
 
 VariedRange range_of(const Scene& scene, const std::string& option) {
-  const std::size_t equals = option.find('=');
-  if (equals == std::string::npos)
-    throw std::invalid_argument(fmt::format("--vary {}: is not NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT", option));
+  std::vector<std::string> parts;  // NAME, LOW, HIGH, COUNT
+  std::istringstream words(option);
+  for (std::string part; std::getline(words, part, parts.empty() ? '=' : ':');) parts.push_back(part);
+  if (parts.size() < 3 || parts.size() > 4 || option.ends_with(':'))
+    refuse("--vary {}: is not NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT", option);
   VariedRange range;
-  range.index = parameter_index(scene, option.substr(0, equals));
+  range.index = parameter_index(scene, parts[0]);
   range.parameter = scene.parameters[static_cast<std::size_t>(range.index)];
-  std::vector<std::string> parts(1);
-  for (const char c : option.substr(equals + 1)) {
-    if (c == ':')
-      parts.emplace_back();
-    else
-      parts.back().push_back(c);
-  }
-  if (parts.size() < 2 || parts.size() > 3)
-    throw std::invalid_argument(fmt::format("--vary {}: is not NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT", option));
-  const double low = number_in(parts[0], option), high = number_in(parts[1], option);
-  if (!(low < high)) throw std::invalid_argument(fmt::format("--vary {}: {} is not below {}", option, low, high));
+  const double low = number_in(parts[1], option), high = number_in(parts[2], option);
+  if (!(low < high)) refuse("--vary {}: {} is not below {}", option, low, high);
   if (range.parameter.scale != ParameterScale::linear && !(low > 0))
-    throw std::invalid_argument(fmt::format("--vary {}: the scale of '{}' is logarithmic, so its values are above 0",
-                                            option, range.parameter.name));
+    refuse("--vary {}: the scale of '{}' is logarithmic, so its values are above 0", option, range.parameter.name);
   range.parameter.lower = low, range.parameter.upper = high;
-  if (parts.size() == 3) {
-    const double count = number_in(parts[2], option);
+  if (parts.size() == 4) {
+    const double count = number_in(parts[3], option);
     if (!(count >= 2 && count <= static_cast<double>(kMostPoints)) || count != std::floor(count))
-      throw std::invalid_argument(
-          fmt::format("--vary {}: {} is not a number of points; at least 2 are needed", option, parts[2]));
+      refuse("--vary {}: {} is not a number of points; at least 2 are needed", option, parts[3]);
     range.count = static_cast<std::size_t>(count);
   }
   return range;
@@ -77,12 +75,10 @@ std::vector<Eigen::VectorXd> grid(const std::vector<VariedRange>& ranges) {
   std::size_t total = 1;
   for (const VariedRange& range : ranges) {
     if (range.count == 0)
-      throw std::invalid_argument(
-          fmt::format("--vary {}=LOW:HIGH: gives no number of points; write LOW:HIGH:COUNT, or use --samples for all",
-                      range.parameter.name));
+      refuse("--vary {}=LOW:HIGH: gives no number of points; write LOW:HIGH:COUNT, or use --samples for all",
+             range.parameter.name);
     total *= range.count;
-    if (total > kMostPoints)
-      throw std::invalid_argument(fmt::format("--vary: the grid has more than {} points", kMostPoints));
+    if (total > kMostPoints) refuse("--vary: the grid has more than {} points", kMostPoints);
   }
   std::vector<Eigen::VectorXd> points;
   points.reserve(total);
@@ -118,9 +114,9 @@ SweepPoints rows_of(const Scene& scene, const std::string& file) {
 
 SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long seed) {
   if (options.points.empty() == options.vary.empty())
-    throw std::invalid_argument("sweep needs either --vary NAME=LOW:HIGH:COUNT, once or more, or --points FILE.csv");
+    refuse("sweep needs either --vary NAME=LOW:HIGH:COUNT, once or more, or --points FILE.csv");
   if (!options.points.empty()) {
-    if (options.samples) throw std::invalid_argument("--samples: are taken within --vary, not from --points");
+    if (options.samples) refuse("--samples: are taken within --vary, not from --points");
     return rows_of(scene, options.points);
   }
   std::vector<VariedRange> ranges;
@@ -128,7 +124,7 @@ SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long s
   for (const std::string& option : options.vary) {
     ranges.push_back(range_of(scene, option));
     if (std::ranges::find(points.parameters, ranges.back().index) != points.parameters.end())
-      throw std::invalid_argument(fmt::format("--vary {}: '{}' is varied twice", option, ranges.back().parameter.name));
+      refuse("--vary {}: '{}' is varied twice", option, ranges.back().parameter.name);
     points.parameters.push_back(ranges.back().index);
   }
   if (!options.samples) {
@@ -136,12 +132,10 @@ SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long s
     return points;
   }
   if (static_cast<std::size_t>(*options.samples) > kMostPoints)
-    throw std::invalid_argument(fmt::format("--samples: {} are more than {} points", *options.samples, kMostPoints));
+    refuse("--samples: {} are more than {} points", *options.samples, kMostPoints);
   std::vector<Parameter> parameters;
   for (const VariedRange& range : ranges) {
-    if (range.count > 0)
-      throw std::invalid_argument(
-          fmt::format("--vary of '{}': has a number of points, and so has --samples", range.parameter.name));
+    if (range.count > 0) refuse("--vary of '{}': has a number of points, and so has --samples", range.parameter.name);
     parameters.push_back(range.parameter);
   }
   points.values = start_values(parameters, {*options.samples + 1, seed, StartSampling::latin_hypercube}, seed);
