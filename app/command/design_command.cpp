@@ -223,7 +223,7 @@ int design_command(const CommandContext& context) {
   run.warn(model_warnings(mechanism, Assembly(mechanism, scene.simulation.start_time)));
 
   LongRun long_run(run);
-  const auto [design, cut_off] = minimised(run, long_run, before.psi);
+  const auto [design, cut_off] = minimised(long_run, before.psi);
   add_to_result(run.result, design);
   const ObjectiveUnits units = objective_units(run.problem);
   add_units(run.result, units);

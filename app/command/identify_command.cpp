@@ -106,10 +106,11 @@ IdentificationOptions simulating(Run& run) {
 }
 
 // given is the problem of the file, cut into windows.
-IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data,
+IdentificationResult fitted(LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data,
                             const Problem& given) {
-  JsonResidualRecords records(long_run.earlier().residuals,
-                              [&](const Json& content) { long_run.add("residuals", content); });
+  Run& run = long_run.run;
+  JsonRecords records(long_run.earlier().records,
+                      [&](const std::string& kind, const Json& content) { long_run.add(kind, content); });
   IdentificationOptions options;
   options.records = &records, options.threads = case_threads(run);
   options.profiles = run.context.options.profiles;
@@ -118,9 +119,8 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.6e}   gradient {:.1e}   step {:.1e}   {}",
                                        row.iteration, row.cost, row.gradient_norm, row.step_norm,
                                        counted(row.simulations, "simulation")));
-    if (row.iteration > long_run.earlier().last_iteration)
-      long_run.add("iterate",
-                   {{"iteration", row.iteration}, {"cost", row.cost}, {"parameters", entries_of(row.parameters)}});
+    long_run.add_iterate(
+        {{"iteration", row.iteration}, {"cost", row.cost}, {"parameters", entries_of(row.parameters)}});
     return !interrupted();
   };
   options.profile_progress = [&](const std::string& name, double value, double tau) {
@@ -352,11 +352,11 @@ int identify_command(const CommandContext& context) {
   say_channels(run, needed, data, start);
   if (context.options.preflight) return preflight(run, start);
   LongRun long_run(run);
-  const BestStart best = from_best_start(run, long_run, whole);
+  const BestStart best = from_best_start(long_run, whole);
   if (interrupted() && run.problem.identification->multistart)
     return stopped_within_starts(run, long_run, best.problem);
   long_run.begin();
-  IdentificationResult fit = fitted(run, long_run, best.problem, whole, cut.problem);
+  IdentificationResult fit = fitted(long_run, best.problem, whole, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
   set_units(fit, cut.problem, data);
   add_to_result(run.result, fit);

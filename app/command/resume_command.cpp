@@ -2,54 +2,48 @@
 
 #include <filesystem>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "app/command/command_line.hpp"
 #include "app/files/journal.hpp"
-#include "app/files/json_text.hpp"
 #include "app/json/source_text.hpp"
 #include "app/run/command.hpp"
+#include "app/run/output_folder.hpp"
 #include "app/terminal/exit_code.hpp"
 
 namespace mbsopt::inline app {
 namespace {
 
-int nothing_left(const CommandContext& context, const std::string& command, const std::string& ended) {
-  const std::filesystem::path folder = context.options.problem_file;
-  const std::string result = read_text_file(folder / "result.json");
-  const std::string message = read_json(result).value("message", "");  // of a failed run, with what to change
-  context.out << fmt::format("{}: its '{}' is finished ({}); there is nothing to resume{}\n", folder.string(), command,
-                             ended, message.empty() ? "" : ": " + message);
-  if (context.json) *context.json << result;
-  return kDone;
+constexpr std::pair<std::string_view, CommandFunction*> kResumable[] = {
+    {"design", design_command}, {"identify", identify_command}, {"sweep", sweep_command}};
+
+CommandFunction* resumable(std::string_view command) {
+  for (const auto& [name, function] : kResumable)
+    if (name == command) return function;
+  return nullptr;
 }
 
-struct LastRun {
-  std::string command, status;
-};
-
-// Reads command and status of a run that can be resumed from result.json; both are empty if there was none.
-LastRun last_run(const std::filesystem::path& folder) {
-  if (!std::filesystem::exists(folder / "result.json")) return {};
-  const Json result = read_json_or_discarded(read_text_file(folder / "result.json"));
-  const auto text = [&](const char* key) {
-    return result.is_object() && result.contains(key) && result[key].is_string() ? result[key].get<std::string>() : "";
-  };
-  const std::string command = text("command");
-  const bool resumes = command == "design" || command == "identify" || command == "sweep";
-  return text("program") == "mbsopt" && resumes ? LastRun{command, text("status")} : LastRun{};
+// The message of a failed run says what to change.
+int nothing_left(const CommandContext& context, const StoredRun& run) {
+  const std::filesystem::path folder = context.options.problem_file;
+  context.out << fmt::format("{}: its '{}' is finished ({}); there is nothing to resume{}\n", folder.string(),
+                             run.command, run.status, run.message.empty() ? "" : ": " + run.message);
+  if (context.json) *context.json << read_text_file(folder / "result.json");
+  return kDone;
 }
 
 }  // namespace
 
 int resume_command(const CommandContext& context) {
   const std::filesystem::path folder = context.options.problem_file;
-  const LastRun last = last_run(folder);
+  StoredRun last = stored_run(folder);
+  if (!resumable(last.command)) last = {};
   if (last.status == "ok" && !std::filesystem::exists(folder / kJournalFile))  // it was removed at the good end
-    return nothing_left(context, last.command, last.status);
+    return nothing_left(context, last);
   const JournalContent journal = read_journal(folder);
-  const std::string command = journal.header.value("command", "");
-  if (!journal.ended.empty() && journal.ended != "interrupted" && journal.ended == last.status)
-    return nothing_left(context, command, journal.ended);
+  const std::vector<Json>& ends = journal.of("ended");
+  if (!ends.empty() && last.status != "interrupted" && ends.back() == last.status) return nothing_left(context, last);
   const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
   CommandOptions options = options_of(arguments);  // those of the run, except for the current folder
   options.threads = context.options.threads, options.quiet = context.options.quiet;
@@ -63,12 +57,10 @@ int resume_command(const CommandContext& context) {
   options.out = folder.string();
   options.resume = true;
   CommandContext again = context;
-  again.command = command, again.arguments = arguments, again.options = options;
-  if (command == "design") return design_command(again);
-  if (command == "identify") return identify_command(again);
-  if (command == "sweep") return sweep_command(again);
+  again.command = journal.header.value("command", ""), again.arguments = arguments, again.options = options;
+  if (CommandFunction* const command = resumable(again.command)) return command(again);
   throw std::invalid_argument(
-      fmt::format("{}: belongs to '{}', which cannot be resumed", (folder / kJournalFile).string(), command));
+      fmt::format("{}: belongs to '{}', which cannot be resumed", (folder / kJournalFile).string(), again.command));
 }
 
 }  // namespace mbsopt::inline app

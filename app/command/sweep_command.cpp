@@ -92,7 +92,7 @@ int sweep_command(const CommandContext& context) {
   run.start();
   if (!settle_accuracy(run)) return run.finish();
   long_run.begin();
-  const std::vector<SweepRow> rows = swept(run, long_run, points, seed);
+  const std::vector<SweepRow> rows = swept(long_run, points, seed);
   const auto done = std::ranges::count_if(rows, &SweepRow::done);
   const auto failed = std::ranges::count_if(rows, [](const SweepRow& row) { return !row.message.empty(); });
   run.result["sweep"] = {{"points", rows.size()}, {"computed", done}, {"failed", failed}};

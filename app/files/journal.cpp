@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <new>
 #include <random>
+#include <utility>
 
 #include "app/files/atomic_file.hpp"
 #include "app/files/sha256.hpp"
@@ -18,7 +19,7 @@
 namespace mbsopt::inline app {
 namespace {
 
-constexpr int kJournalVersion = 4;
+constexpr int kJournalVersion = 5;
 constexpr std::string_view kSealBegin = ",\"sha256\":\"", kSealEnd = "\"}";
 constexpr std::size_t kSealSize = 64;  // of SHA-256 in hex
 // The interval between flushes of evaluations. A flush takes up to 10 ms (measured: 8 ms on ext4 of a virtual disk), so
@@ -27,18 +28,16 @@ constexpr std::chrono::milliseconds kFlushInterval{100};
 
 bool is_evaluation(std::string_view kind) { return kind == "point" || kind == "hessians" || kind == "residuals"; }
 
-struct Line {
-  std::string text, seal;  // text: with its end
-};
-
-Line sealed(const Json& record, const std::string& run, const std::string& seal_before) {
+// The line of a record, with its end. Moves the journal's end behind it.
+std::string sealed(const Json& record, JournalEnd& end) {
   std::string text = json_text(record);
   text.pop_back();  // the closing bracket
-  text += fmt::format(",\"run\":\"{}\"", run);
+  text += fmt::format(",\"run\":\"{}\"", end.run);
   text += fmt::format(",\"bytes\":{}", text.size());
-  const std::string seal = sha256_of(seal_before + text);
-  text.append(kSealBegin).append(seal).append(kSealEnd).append("\n");
-  return {std::move(text), seal};
+  end.seal = sha256_of(end.seal + text);
+  text += fmt::format("{}{}{}\n", kSealBegin, end.seal, kSealEnd);
+  end.bytes += text.size();
+  return text;
 }
 
 // The checksum at the end of a line; empty if it does not fit the line.
@@ -77,20 +76,14 @@ void refuse_foreign(const std::filesystem::path& file) {
         ": is not a journal of mbsopt and is never overwritten; name another folder with --out, or move it");
 }
 
-void add_line(JournalContent& content, const Json& line) {
-  if (line.contains("point")) {
-    content.points.push_back(line["point"]);
-  } else if (line.contains("hessians")) {
-    content.hessians.push_back(line["hessians"]);
-  } else if (line.contains("residuals")) {
-    content.residuals.push_back(line["residuals"]);
-  } else if (line.contains("start")) {
-    content.starts.push_back(line["start"]);
-  } else if (line.contains("iterate")) {
-    content.last_iteration = line["iterate"].value("iteration", content.last_iteration);
-  } else if (line.contains("ended")) {
-    content.ended = line["ended"].get<std::string>();
-  }
+// Begins a journal with its first line.
+JournalEnd begun(const std::filesystem::path& file, const Json& header) {
+  refuse_foreign(file);
+  JournalEnd end{drawn_run_id(), {}};
+  Json first{{"journal", kJournalVersion}};
+  first.update(header);
+  write_file_atomically(file, sealed(first, end));
+  return end;
 }
 
 std::string text_of(const std::filesystem::path& file) {
@@ -110,23 +103,30 @@ JournalContent read_journal(const std::filesystem::path& folder) {
     refuse("there is none; 'resume' continues a folder that 'design', 'identify' or 'sweep' of this version has begun");
   const std::string text = text_of(file);
   JournalContent content;
+  JournalEnd& last = content.end;
   int number = 0;
-  for (std::size_t end; (end = text.find('\n', content.bytes)) != std::string::npos; content.bytes = end + 1) {
-    const std::string_view line = std::string_view(text).substr(content.bytes, end - content.bytes);
+  for (std::size_t end; (end = text.find('\n', last.bytes)) != std::string::npos; last.bytes = end + 1) {
+    const std::string_view line = std::string_view(text).substr(last.bytes, end - last.bytes);
     const Json record = object_of(line);
     if (++number == 1 && record.value("journal", Json()) != kJournalVersion) refuse("is no journal of this version");
-    content.seal = seal_of(line, content.seal);
-    if (content.seal.empty())
+    last.seal = seal_of(line, last.seal);
+    if (last.seal.empty() || record.empty())
       refuse(fmt::format(
           "line {} is damaged, or not of this run: its checksum does not fit; {}", number,
           number == 1 ? "start the run anew" : "remove this line and all after it, and 'resume' continues from there"));
     if (number == 1)
-      content.header = record, content.run = record.at("run").get<std::string>();
+      content.header = record, last.run = record.at("run").get<std::string>();
     else
-      add_line(content, record);
+      content.records[record.begin().key()].push_back(record.begin().value());
   }
   if (number == 0) refuse("holds no whole line; start the run anew");
   return content;
+}
+
+const std::vector<Json>& JournalContent::of(const std::string& kind) const {
+  static const std::vector<Json> none;
+  const auto found = records.find(kind);
+  return found == records.end() ? none : found->second;
 }
 
 void read_record(const std::function<void()>& read) {
@@ -140,34 +140,21 @@ void read_record(const std::function<void()>& read) {
 }
 
 Journal::Journal(const std::filesystem::path& folder, const Json& header)
-    : path_(folder / kJournalFile), run_(drawn_run_id()) {
-  refuse_foreign(path_);
-  Json first{{"journal", kJournalVersion}};
-  first.update(header);
-  const Line line = sealed(first, run_, seal_);
-  write_file_atomically(path_, line.text);
-  seal_ = line.seal, bytes_ = line.text.size();
-  open();
-}
+    : Journal(folder, begun(folder / kJournalFile, header)) {}
 
-Journal::Journal(const std::filesystem::path& folder, const JournalContent& earlier)
-    : path_(folder / kJournalFile), run_(earlier.run), seal_(earlier.seal), bytes_(earlier.bytes) {
+Journal::Journal(const std::filesystem::path& folder, JournalEnd end)
+    : path_(folder / kJournalFile), end_(std::move(end)) {
   refuse_foreign(path_);
-  open();
-  if (::ftruncate(descriptor_, static_cast<off_t>(bytes_)) != 0) {
-    ::close(descriptor_);
-    throw WriteError(path_, "cannot be cut to its last whole line");
-  }
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_NOFOLLOW | O_CLOEXEC);
+  if (descriptor_ < 0) throw WriteError(path_, "cannot be opened");
+  if (::ftruncate(descriptor_, static_cast<off_t>(end_.bytes)) == 0) return;
+  ::close(descriptor_);
+  throw WriteError(path_, "cannot be cut to its last whole line");
 }
 
 Journal::~Journal() {
   flush();
   ::close(descriptor_);
-}
-
-void Journal::open() {
-  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_NOFOLLOW | O_CLOEXEC);
-  if (descriptor_ < 0) throw WriteError(path_, "cannot be opened");
 }
 
 bool Journal::flush() {
@@ -176,20 +163,22 @@ bool Journal::flush() {
   return true;
 }
 
-void Journal::add(const char* kind, const Json& content) {
-  const Line line = sealed(Json{{kind, content}}, run_, seal_);
+void Journal::add(const std::string& kind, const Json& content) {
+  JournalEnd end = end_;
+  const std::string line = sealed(Json{{kind, content}}, end);
   const auto is_due = [&] {
     return !is_evaluation(kind) || std::chrono::steady_clock::now() - flushed_at_ >= kFlushInterval;
   };
-  const bool written = write_all(descriptor_, line.text);
+  const bool written = write_all(descriptor_, line);
   is_flushed_ = false;
   if (!written || (is_due() && !flush())) {
     const int why = errno;
-    [[maybe_unused]] const int cut = ::ftruncate(descriptor_, static_cast<off_t>(bytes_));  // else a reader drops it
+    [[maybe_unused]] const int cut =
+        ::ftruncate(descriptor_, static_cast<off_t>(end_.bytes));  // else a reader drops it
     errno = why;
     throw WriteError(path_, "cannot be written");
   }
-  seal_ = line.seal, bytes_ += line.text.size();
+  end_ = std::move(end);
 }
 
 bool Journal::exists() const {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "app/files/atomic_file.hpp"
 #include "app/terminal/exit_code.hpp"
@@ -33,56 +34,44 @@ Json header_of(const Run& run, const Json& seeds) {
 
 }  // namespace
 
-LongRun::LongRun(Run& run) : run_(run) {
+LongRun::LongRun(Run& its_run) : run(its_run) {
   if (run.context.options.resume) earlier_ = read_journal(run.folder.path());
 }
 
 LongRun::~LongRun() {
   if (!journal_ || finished_) return;
   try {
-    run_.progress.finish();
-    run_.context.err << how_to_continue() << '\n';
+    run.progress.finish();
+    run.context.err << how_to_continue() << '\n';
   } catch (...) {  // the exception under way says more than this one
   }
 }
 
 long LongRun::seed(const std::string& of, const std::optional<long>& given) {
-  long value = 0;
-  if (given)
-    value = *given;
-  else if (earlier_.header.contains("seeds") && earlier_.header["seeds"].contains(of))
-    value = earlier_.header["seeds"][of].get<long>();
-  else
-    value = drawn_seed();
+  const Json earlier = earlier_.header.value("seeds", Json::object());
+  const long value = given ? *given : earlier.contains(of) ? earlier[of].get<long>() : drawn_seed();
   seeds_[of] = value;
   return value;
 }
 
-void LongRun::refuse_what_has_changed() const {
-  const Json now = header_of(run_, seeds_);
-  for (const char* key : {"version", "input_sha256", "data_sha256"}) {
-    const Json before = earlier_.header.value(key, Json()), after = now.value(key, Json());
-    if (before == after) continue;
-    throw OutputError(fmt::format("{}: was begun with another {} and cannot be resumed: start '{}' anew",
-                                  (run_.folder.path() / kJournalFile).string(),
-                                  std::string(key) == "version"        ? "version of mbsopt"
-                                  : std::string(key) == "input_sha256" ? "content of the problem file"
-                                                                       : "content of a data file, plug-in or program",
-                                  run_.context.command));
-  }
-}
-
 void LongRun::begin() {
   if (journal_) return;
-  if (!run_.context.options.resume) {
-    journal_ = std::make_unique<Journal>(run_.folder.path(), header_of(run_, seeds_));
+  const std::filesystem::path& folder = run.folder.path();
+  const Json header = header_of(run, seeds_);
+  if (!run.context.options.resume) {
+    journal_ = std::make_unique<Journal>(folder, header);
     return;
   }
-  refuse_what_has_changed();
-  journal_ = std::make_unique<Journal>(run_.folder.path(), earlier_);
+  for (const auto& [key, what] : {std::pair{"version", "version of mbsopt"},
+                                  {"input_sha256", "content of the problem file"},
+                                  {"data_sha256", "content of a data file, plug-in or program"}})
+    if (earlier_.header.value(key, Json()) != header.value(key, Json()))
+      throw OutputError(fmt::format("{}: was begun with another {} and cannot be resumed: start '{}' anew",
+                                    (folder / kJournalFile).string(), what, run.context.command));
+  journal_ = std::make_unique<Journal>(folder, earlier_.end);
 }
 
-void LongRun::add(const char* kind, const Json& content) {
+void LongRun::add(const std::string& kind, const Json& content) {
   if (failure_) return;
   try {
     journal_->add(kind, content);
@@ -92,34 +81,39 @@ void LongRun::add(const char* kind, const Json& content) {
   }
 }
 
+void LongRun::add_iterate(const Json& iterate) {
+  const std::vector<Json>& before = earlier_.of("iterate");
+  if (before.empty() || iterate.at("iteration") > before.back().at("iteration")) add("iterate", iterate);
+}
+
 std::string LongRun::how_to_continue() const {
   if (!journal_->exists()) return "the journal was deleted during the run, so nothing can be resumed";
-  return fmt::format("'mbsopt resume {}' continues", run_.folder.path().string());
+  return fmt::format("'mbsopt resume {}' continues", run.folder.path().string());
 }
 
 void LongRun::stopped(const std::string& kept) {
   const std::string words = kept + "; " + how_to_continue();
-  failure_ ? run_.failed(*failure_ + "; " + words) : run_.stopped(words);
+  failure_ ? run.failed(*failure_ + "; " + words) : run.stopped(words);
 }
 
 void LongRun::failed(SolverStatus status, const std::string& message) {
-  if (status != SolverStatus::iteration_limit) return run_.failed(message);
-  const std::string& command = run_.context.command;
-  run_.failed(fmt::format(
+  if (status != SolverStatus::iteration_limit) return run.failed(message);
+  const std::string& command = run.context.command;
+  run.failed(fmt::format(
       "{}; raise {}.optimizer.max_iterations or max_evaluations, or go on from the best point: 'mbsopt {} {} --out "
       "ANOTHER_DIR'",
       message, command == "identify" ? "identification" : command, command,
-      (run_.folder.path() / "optimized.json").string()));
+      (run.folder.path() / "optimized.json").string()));
 }
 
 int LongRun::finish() {
-  const int exit_code = run_.finish();
+  const int exit_code = run.finish();
   finished_ = true;
-  if (!failure_) journal_->add("ended", run_.result["status"]);
-  if (exit_code == kDone && !run_.context.options.keep_journal) {
+  if (!failure_) journal_->add("ended", run.result["status"]);
+  if (exit_code == kDone && !run.context.options.keep_journal) {
     journal_.reset();
     std::error_code ignored;  // a journal that stays says that the run has ended
-    std::filesystem::remove(run_.folder.path() / kJournalFile, ignored);
+    std::filesystem::remove(run.folder.path() / kJournalFile, ignored);
   }
   return exit_code;
 }

@@ -3,7 +3,7 @@
 //   LongRun long_run(run);
 //   spec.seed = long_run.seed("multistart", spec.seed);   // given, or that of the resumed run, or drawn
 //   long_run.begin();                                     // throws OutputError when the input has changed
-//   long_run.earlier().starts ...                         // what was done before
+//   long_run.earlier().of("start") ...                    // what was done before
 //   long_run.add("start", record);
 //   return long_run.finish();                             // that of Run; a successful run needs no journal
 #pragma once
@@ -31,20 +31,20 @@ class LongRun {
   // is removed, unless the run failed or --keep-journal is set.
   int finish();
 
+  Run& run;
   const JournalContent& earlier() const { return earlier_; }
   // Adds a line to the journal. No exception may pass through a solver. If the journal cannot be written, the run stops
   // as by a signal, and reports the failure at its end.
-  void add(const char* kind, const Json& content);
+  void add(const std::string& kind, const Json& content);
+  void add_iterate(const Json& iterate);  // unless the earlier run has: its "iteration" says so
   // Ends a stopped run. kept names the content of the folder.
   void stopped(const std::string& kept);
   // Ends a failed search, whose best point is in optimized.json. At a limit of iterations it says what to change.
   void failed(SolverStatus status, const std::string& message);
 
  private:
-  void refuse_what_has_changed() const;
   std::string how_to_continue() const;
 
-  Run& run_;
   JournalContent earlier_;
   Json seeds_ = Json::object();
   std::unique_ptr<Journal> journal_;

@@ -30,25 +30,9 @@ std::string folder_name(std::string name) {
   return name;
 }
 
-// The problem and the command of a result.json; empty if this program has not written it.
-struct StoredRun {
-  std::string owner, command;
-};
-
 std::string text_at(const Json& object, const char* key) {
   const auto found = object.is_object() ? object.find(key) : object.end();
   return found != object.end() && found->is_string() ? found->get<std::string>() : std::string{};
-}
-
-StoredRun stored_run(const fs::path& file) {
-  Json result;
-  try {
-    result = read_json_or_discarded(content_of_regular_file(file));
-  } catch (const FileError&) {
-    return {};
-  }
-  if (text_at(result, "program") != "mbsopt" || !result.contains("provenance")) return {};
-  return {text_at(result.at("provenance"), "input"), text_at(result, "command")};
 }
 
 // Call this only with the folder's lock: the parts may belong to a running command.
@@ -63,6 +47,18 @@ void remove_parts(const fs::path& folder) {
 }
 
 }  // namespace
+
+StoredRun stored_run(const fs::path& folder) {
+  Json result;
+  try {
+    result = read_json_or_discarded(content_of_regular_file(folder / "result.json"));
+  } catch (const FileError&) {
+    return {};
+  }
+  if (text_at(result, "program") != "mbsopt" || !result.contains("provenance")) return {};
+  return {text_at(result.at("provenance"), "input"), text_at(result, "command"), text_at(result, "status"),
+          text_at(result, "message")};
+}
 
 OutputFolder::OutputFolder(const std::string& requested, const std::string& problem_name,
                            const std::string& problem_file, const std::string& command)
@@ -81,22 +77,21 @@ std::unique_ptr<FolderLock> OutputFolder::claim() const {
 }
 
 void OutputFolder::refuse_if_taken() const {
-  const fs::path marker = path_ / "result.json";
-  const auto [owner, stored_command] = stored_run(marker);
-  if (owner == owner_) {
-    const bool costly = stored_command == "design" || stored_command == "identify";
-    if (!costly || stored_command == command_ || !fs::exists(path_ / "optimized.json")) return;
+  const StoredRun stored = stored_run(path_);
+  if (stored.owner == owner_) {
+    const bool costly = stored.command == "design" || stored.command == "identify";
+    if (!costly || stored.command == command_ || !fs::exists(path_ / "optimized.json")) return;
     throw OutputError(fmt::format(
         "{0}: holds the outcome of '{1}', which '{2}' would overwrite; name another folder with --out, such as --out "
         "{3}, or remove this one",
-        path_.string(), stored_command, command_,
+        path_.string(), stored.command, command_,
         (path_.parent_path() / (path_.filename().string() + "_" + command_)).string()));
   }
-  if (!owner.empty()) {
+  if (!stored.owner.empty()) {
     throw OutputError(fmt::format(
         "{}: holds the results of another problem ({}); they are never overwritten: name another folder with --out, or "
         "remove this one",
-        path_.string(), (path_ / owner).lexically_normal().string()));
+        path_.string(), (path_ / stored.owner).lexically_normal().string()));
   }
   for (const char* name : kOutputs) {
     if (fs::exists(path_ / name)) {

@@ -16,6 +16,12 @@
 
 namespace mbsopt::inline app {
 
+// The problem, the command and the status of a result.json; empty if this program has not written it.
+struct StoredRun {
+  std::string owner, command, status, message;
+};
+StoredRun stored_run(const std::filesystem::path& folder);
+
 class OutputFolder {
  public:
   // Creates the folder if necessary.

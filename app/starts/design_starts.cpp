@@ -38,20 +38,20 @@ Problem with_seeds(Problem problem, LongRun& long_run) {
   return problem;
 }
 
-DesignResult single_run(Run& run, LongRun& long_run, const Problem& problem) {
-  JsonPointRecords records(long_run.earlier().points, long_run.earlier().hessians,
-                           [&](const char* kind, const Json& content) { long_run.add(kind, content); });
+DesignResult single_run(LongRun& long_run, const Problem& problem) {
+  Run& run = long_run.run;
+  JsonRecords records(long_run.earlier().records,
+                      [&](const std::string& kind, const Json& content) { long_run.add(kind, content); });
   DesignOptions options;
   options.records = &records;
   options.threads = case_threads(run);
   options.simulation_progress = run.watched("simulating");
   options.progress = [&](const DesignRow& row) {
     run.progress.iteration(progress_line(row));
-    if (row.iteration > long_run.earlier().last_iteration)
-      long_run.add("iterate", {{"iteration", row.iteration},
-                               {"objective", row.objective},
-                               {"infeasibility", row.violation},
-                               {"parameters", by_name(problem.design->variables, row.parameters)}});
+    long_run.add_iterate({{"iteration", row.iteration},
+                          {"objective", row.objective},
+                          {"infeasibility", row.violation},
+                          {"parameters", by_name(problem.design->variables, row.parameters)}});
     return !interrupted();
   };
   return run_design(problem, options);
@@ -76,12 +76,10 @@ std::optional<int> mode_of(int run, const std::optional<int>& modes) {
   return modes ? std::optional(run % *modes) : std::nullopt;
 }
 
-// Runs in a worker process from one start. The record holds its points, from which the best run is repeated.
+// Runs in a worker process from one start. The record holds its evaluations, from which the best run is repeated.
 Json record_of_start(const Problem& problem, const NlpScale& scale, std::optional<int> mode, int start) {
-  Json points = Json::array(), hessians = Json::array();
-  JsonPointRecords records({}, {}, [&](const char* kind, const Json& content) {
-    (std::string_view(kind) == "point" ? points : hessians).push_back(content);
-  });
+  JournalRecords evaluations;
+  JsonRecords records({}, [&](const std::string& kind, const Json& content) { evaluations[kind].push_back(content); });
   DesignOptions options;
   options.records = &records;
   options.simulation_progress = [](double) { return !interrupted(); };
@@ -113,25 +111,24 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
   }
   constexpr double kLong = 2e-3;  // [s] per point; a shorter one is sooner computed again than written and read
   const bool is_long = design.status == SolverStatus::stopped ||  // only its points lead to the same end again
-                       design.wall_seconds > kLong * static_cast<double>(points.size());
-  record["points"] = is_long ? std::move(points) : Json::array();
-  record["hessians"] = is_long ? std::move(hessians) : Json::array();
+                       design.wall_seconds > kLong * static_cast<double>(evaluations["point"].size());
+  record["recorded"] = is_long ? evaluations : JournalRecords();
   return record;
 }
 
-// Repeats the run of a record from its points. A start that ended is repeated to its end, whatever interrupts. A start
-// that was stopped ends after its points. If it has none (TrackedSquares), it ends at the iterate of the record.
+// Repeats the run of a record from its evaluations. A start that ended is repeated to its end, whatever interrupts. A
+// start that was stopped ends after its points. If it has none (TrackedSquares), it ends at the iterate of the record.
 DesignResult told_again(const Problem& problem, const NlpScale& scale, std::optional<int> mode, const Json& record) {
-  JsonPointRecords records(record.at("points").get<std::vector<Json>>(), record.at("hessians").get<std::vector<Json>>(),
-                           [](const char*, const Json&) {});
+  auto evaluations = record.at("recorded").get<JournalRecords>();
+  JsonRecords records(evaluations, [](const std::string&, const Json&) {});
   const bool stopped = record.at("status").get<std::string>() == to_string(SolverStatus::stopped);
-  const bool unrecorded = record.at("points").empty();
+  const bool unrecorded = evaluations["point"].empty();
   DesignOptions options;
   options.records = &records;
-  options.simulation_progress = [&](double) { return !stopped || unrecorded || !records.all_recalled(); };
+  options.simulation_progress = [&](double) { return !stopped || unrecorded || !records.all_points_recalled(); };
   options.progress = [&](const DesignRow& row) {
     const Json reached = by_name(problem.design->variables, row.parameters);
-    return !stopped || (unrecorded ? reached != record.at("parameters") : !records.all_recalled());
+    return !stopped || (unrecorded ? reached != record.at("parameters") : !records.all_points_recalled());
   };
   options.scale = scale, options.mode = mode;
   options.compare_differences = !interrupted();
@@ -185,9 +182,9 @@ Json task_of(const Problem& problem, const NlpScale& scale, const std::optional<
   return task;
 }
 
-DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& seeded, const Eigen::VectorXd& before) {
+DesignOutcome best_of_starts(LongRun& long_run, const Problem& seeded, const Eigen::VectorXd& before) {
   DesignOptions until_interrupted;
-  until_interrupted.simulation_progress = run.watched("simulating");
+  until_interrupted.simulation_progress = long_run.run.watched("simulating");
   Problem problem = seeded;
   problem.design->sharpness = design_sharpness(seeded, until_interrupted);
   MultistartSpec spec = *problem.design->multistart;
@@ -202,14 +199,17 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& seeded,
   const auto from = starts_of(problem, modes.value_or(1));
   const NlpScale scale = design_scale(from(0), until_interrupted);
   const MultistartOutcome outcome =
-      run_multistart(run, long_run, spec, design_start_work(problem, task_of(problem, scale, modes)));
+      run_multistart(long_run, spec, design_start_work(problem, task_of(problem, scale, modes)));
   const Json* const best = outcome.best();
   DesignOutcome result;
   result.interrupted = outcome.interrupted;
-  result.design =
-      best ? told_again(from((*best)["start"].get<int>()), scale, mode_of((*best)["start"].get<int>(), modes), *best)
-           : run_design(from(0), until_interrupted);
-  if (best) describe_given(problem, before, result.design);
+  if (best) {
+    const int start = (*best)["start"].get<int>();
+    result.design = told_again(from(start), scale, mode_of(start, modes), *best);
+    describe_given(problem, before, result.design);
+  } else {
+    result.design = run_design(from(0), until_interrupted);
+  }
   // The best run is repeated from its points, which is no further search.
   result.design.simulations = outcome.simulations, result.design.wall_seconds = outcome.wall_seconds;
   return result;
@@ -231,16 +231,13 @@ StartWork design_start_work(Problem problem, const Json& task) {
           }};
 }
 
-DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& before) {
-  const Problem problem = with_seeds(run.problem, long_run);
+DesignOutcome minimised(LongRun& long_run, const Eigen::VectorXd& before) {
+  const Problem problem = with_seeds(long_run.run.problem, long_run);
   long_run.begin();
-  DesignOutcome outcome;
-  if (problem.design->multistart)
-    outcome = best_of_starts(run, long_run, problem, before);
-  else
-    outcome.design = single_run(run, long_run, problem);
+  DesignOutcome outcome = problem.design->multistart ? best_of_starts(long_run, problem, before)
+                                                     : DesignOutcome{single_run(long_run, problem)};
   if (outcome.design.evaluations == 0) describe_unmoved(problem, before, outcome.design);
-  run.progress.finish();
+  long_run.run.progress.finish();
   return outcome;
 }
 

@@ -1,7 +1,6 @@
 // The minimisation of the design command: one run, or the best of a multistart. It writes a journal and can be resumed.
 #pragma once
 
-#include "app/run/long_run.hpp"
 #include "app/starts/start_workers.hpp"
 #include "optim/design/design.hpp"
 
@@ -16,7 +15,7 @@ struct DesignOutcome {
 };
 
 // before holds the objectives at the given values, in the problem's order.
-DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& before);
+DesignOutcome minimised(LongRun& long_run, const Eigen::VectorXd& before);
 
 // The starts of its multistart, from the task of this process or another one.
 StartWork design_start_work(Problem problem, const Json& task);

@@ -85,13 +85,13 @@ StartWork identify_start_work(const Problem& problem, const Json& task) {
   return start_work(problem, data_of(problem), task.at("seed").get<long>());
 }
 
-BestStart from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data) {
-  const Problem& problem = run.problem;
+BestStart from_best_start(LongRun& long_run, const std::vector<CsvTable>& data) {
+  const Problem& problem = long_run.run.problem;
   if (!problem.identification->multistart) return {problem};
   MultistartSpec spec = *problem.identification->multistart;
   spec.seed = long_run.seed("multistart", spec.seed);
   long_run.begin();
-  const MultistartOutcome outcome = run_multistart(run, long_run, spec, start_work(problem, data, *spec.seed));
+  const MultistartOutcome outcome = run_multistart(long_run, spec, start_work(problem, data, *spec.seed));
   return {outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object()), outcome.simulations,
           outcome.wall_seconds};
 }

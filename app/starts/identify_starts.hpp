@@ -3,7 +3,6 @@
 
 #include <vector>
 
-#include "app/run/long_run.hpp"
 #include "app/starts/start_workers.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/problem/csv_table.hpp"
@@ -18,7 +17,7 @@ struct BestStart {
 
 // Returns the given problem if there is no multistart. Shared variables are spread over their bounds. Parameters that
 // are free in an experiment begin at their given values.
-BestStart from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
+BestStart from_best_start(LongRun& long_run, const std::vector<CsvTable>& data);
 
 // The starts, from the task of this process or another one.
 StartWork identify_start_work(const Problem& problem, const Json& task);

@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <iterator>
-#include <set>
 #include <tuple>
 
 #include "app/report/report_parts.hpp"
@@ -33,57 +32,56 @@ std::tuple<int, double, double, int> rank(const Json& record) {
   return {1, violation, objective, number_of(record)};
 }
 
-Json record_of(const JobReply& reply) {
-  if (reply.ok) return read_json(reply.text);
-  return {{"start", reply.job}, {"status", "failed"}, {"message", reply.text}, {"objective", nullptr}};
-}
-
-std::string text_of(const Json& record, const char* key) {
+std::string text_of(const Json& record, const std::string& key) {
   if (!record.contains(key) || record[key].is_null()) return "-";
+  if (record[key].is_string()) return record[key].get<std::string>();
   return record[key].is_number_integer() ? std::to_string(record[key].get<long>())
                                          : significant(record[key].get<double>());
 }
 
-void print_waterfall(std::ostream& out, const std::vector<Json>& ranked) {
-  std::vector<std::string> header{"rank", "start", "status", "objective", "infeasibility", "iterations", "evaluations"};
-  if (!ranked.empty() && ranked[0].contains("parameters"))
-    for (const auto& [name, value] : ranked[0]["parameters"].items()) header.push_back(name);
-  TextTable table(header);
-  for (std::size_t i = 0; i < std::min(kPrinted, ranked.size()); ++i) {
-    const Json& record = ranked[i];
-    std::vector<std::string> row{
-        std::to_string(i + 1),         text_of(record, "start"),         record["status"].get<std::string>(),
-        text_of(record, "objective"),  text_of(record, "infeasibility"), text_of(record, "iterations"),
-        text_of(record, "evaluations")};
-    for (std::size_t k = row.size(); k < header.size(); ++k)
-      row.push_back(record.contains("parameters") ? text_of(record["parameters"], header[k].c_str()) : "-");
-    table.add(row);
-  }
+// Prints a table of the first ones.
+template <class Row>
+void print_first(std::ostream& out, TextTable table, std::size_t count, const Row& row) {
+  for (std::size_t i = 0; i < std::min(kPrinted, count); ++i) table.add(row(i));
   out << '\n' << table.text();
-  if (ranked.size() > kPrinted) out << fmt::format("... and {} more, in result.json\n", ranked.size() - kPrinted);
+  if (count > kPrinted) out << fmt::format("... and {} more, in result.json\n", count - kPrinted);
 }
 
-void describe(const std::vector<DistinctOptimum>& optima, const SearchedOptima& found, bool all_found, Json& result) {
-  Json list = Json::array();
+void print_waterfall(std::ostream& out, const std::vector<Json>& ranked) {
+  const std::array columns{"start", "status", "objective", "infeasibility", "iterations", "evaluations"};
+  std::vector<std::string> header{"rank"}, parameters;
+  header.insert(header.end(), columns.begin(), columns.end());
+  if (!ranked.empty() && ranked[0].contains("parameters"))
+    for (const auto& [name, value] : ranked[0]["parameters"].items()) parameters.push_back(name);
+  header.insert(header.end(), parameters.begin(), parameters.end());
+  print_first(out, TextTable(header), ranked.size(), [&](std::size_t i) {
+    std::vector<std::string> row{std::to_string(i + 1)};
+    for (const char* column : columns) row.push_back(text_of(ranked[i], column));
+    for (const std::string& name : parameters)
+      row.push_back(text_of(ranked[i].value("parameters", Json::object()), name));
+    return row;
+  });
+}
+
+// Adds the distinct optima to the result, and prints them.
+void tell_optima(Run& run, const std::vector<DistinctOptimum>& optima, bool all_found) {
+  const SearchedOptima found = searched(optima);
+  Json& result = run.result["multistart"];
+  result["optima"] = Json::array();
   for (const DistinctOptimum& o : optima) {
-    Json& entry = list.emplace_back(Json{{"start", number_of(*o.best)}, {"found_by", o.starts}});
+    Json& entry = result["optima"].emplace_back(Json{{"start", number_of(*o.best)}, {"found_by", o.starts}});
     for (const char* key : {"objective", "infeasibility", "assembly_mode", "parameters"})
       if (o.best->contains(key)) entry[key] = (*o.best)[key];
   }
-  result["optima"] = std::move(list);
-  result["expected_optima"] = found.expected() ? Json(*found.expected()) : Json();
+  result["expected_optima"] = or_null(found.expected());
   result["covered"] = found.covered();
   result["all_found"] = all_found;
-}
-
-void print(const std::vector<DistinctOptimum>& optima, const SearchedOptima& found, bool all_found, std::ostream& out) {
   if (optima.empty()) return;
-  TextTable table({"optimum", "found by", "first start", "objective"});
-  for (std::size_t i = 0; i < std::min(kPrinted, optima.size()); ++i)
-    table.add({std::to_string(i + 1), counted(optima[i].starts, "start"), text_of(*optima[i].best, "start"),
-               text_of(*optima[i].best, "objective")});
-  out << '\n' << table.text();
-  if (optima.size() > kPrinted) out << fmt::format("... and {} more, in result.json\n", optima.size() - kPrinted);
+  std::ostream& out = run.context.out;
+  print_first(out, TextTable({"optimum", "found by", "first start", "objective"}), optima.size(), [&](std::size_t i) {
+    return std::vector{std::to_string(i + 1), counted(optima[i].starts, "start"), text_of(*optima[i].best, "start"),
+                       text_of(*optima[i].best, "objective")};
+  });
   out << fmt::format("{} in {} that converged", counted(found.optima, "optimum", "optima"),
                      counted(found.searches, "search", "searches"));
   if (found.expected())
@@ -92,41 +90,29 @@ void print(const std::vector<DistinctOptimum>& optima, const SearchedOptima& fou
   out << '\n';
 }
 
-Json without_points(const Json& record) {
+Json without_recorded(const Json& record) {
   Json short_record = Json::object();
   for (const auto& [key, value] : record.items())
-    if (key != "points" && key != "hessians" && key != "motion") short_record[key] = value;
+    if (key != "recorded" && key != "motion") short_record[key] = value;
   return short_record;
 }
 
 // Returns whether the search ended because it had found all optima (spec.until_all_found).
-bool compute_batches(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work,
-                     MultistartOutcome& outcome) {
-  std::set<int> finished;
-  for (const Json& record : long_run.earlier().starts) {
-    if (finished.insert(number_of(record)).second) outcome.ranked.push_back(record);
-  }
-  const auto done = [&](const JobReply& reply) {
-    const Json record = record_of(reply);
-    const std::string status = record["status"];
-    const bool cut_off = status == "stopped" || (!reply.ok && interrupted());
-    // A worker that crashed may succeed next time, so it is not in the journal.
-    if (!cut_off && reply.ok) long_run.add("start", record);
-    outcome.interrupted = outcome.interrupted || cut_off;
+bool compute_batches(LongRun& long_run, const MultistartSpec& spec, const StartWork& work, MultistartOutcome& outcome) {
+  Run& run = long_run.run;
+  outcome.ranked = long_run.earlier().of("start");
+  const auto done = [&](const Json& record) {
     outcome.ranked.push_back(record);
-    run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", reply.job, status,
-                                       text_of(record, "objective"), outcome.ranked.size(), spec.starts));
+    run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", number_of(record),
+                                       text_of(record, "status"), text_of(record, "objective"), outcome.ranked.size(),
+                                       spec.starts));
   };
   const auto show = [&] { run.progress.fraction("starts", static_cast<double>(outcome.ranked.size()) / spec.starts); };
   const int batch = spec.until_all_found ? kBatch : spec.starts;
   bool ends = false;
   for (int first = 0; first < spec.starts && !ends && !outcome.interrupted; first += batch) {
     const int last = std::min(first + batch, spec.starts);
-    std::vector<int> jobs;
-    for (int start = first; start < last; ++start)
-      if (!finished.contains(start)) jobs.push_back(start);
-    compute_starts(run, jobs, work, done, show);
-    outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(last);
+    outcome.interrupted = !compute_starts(long_run, first, last, work, done, show);
     std::ranges::sort(outcome.ranked, {}, rank);
     if (!spec.until_all_found) continue;
     std::vector<Json> looked_at;  // a resumed run may know starts of a later batch
@@ -154,7 +140,7 @@ void tell_starts(Run& run, const MultistartSpec& spec, const MultistartOutcome& 
             {"wall_seconds", outcome.wall_seconds},
             {"best", best ? Json(number_of(*best)) : Json()},
             {"at_the_best_optimum", same}};
-  for (const Json& record : outcome.ranked) result["waterfall"].push_back(without_points(record));
+  for (const Json& record : outcome.ranked) result["waterfall"].push_back(without_recorded(record));
   print_waterfall(run.context.out, outcome.ranked);
   run.context.out << starts_in_words(result) << '\n';
   const auto ended = [&](const char* optimum) {
@@ -198,18 +184,17 @@ Problem with_values(Problem problem, const Json& values) {
   return problem;
 }
 
-MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work) {
+MultistartOutcome run_multistart(LongRun& long_run, const MultistartSpec& spec, const StartWork& work) {
+  Run& run = long_run.run;
   MultistartOutcome outcome;
-  const bool all_found = compute_batches(run, long_run, spec, work, outcome);
+  const bool all_found = compute_batches(long_run, spec, work, outcome);
   run.progress.finish();
   for (const Json& record : outcome.ranked) {
     outcome.simulations += record.value("simulations", 0L);
     outcome.wall_seconds += record.value("wall_seconds", 0.0);
   }
   tell_starts(run, spec, outcome);
-  const std::vector<DistinctOptimum> optima = distinct_optima(outcome.ranked, run.problem.scene);
-  describe(optima, searched(optima), all_found, run.result["multistart"]);
-  print(optima, searched(optima), all_found, run.context.out);
+  tell_optima(run, distinct_optima(outcome.ranked, run.problem.scene), all_found);
   return outcome;
 }
 

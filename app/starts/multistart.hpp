@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "app/files/result_json.hpp"
-#include "app/run/long_run.hpp"
 #include "app/starts/start_workers.hpp"
 #include "optim/problem/problem.hpp"
 
@@ -28,7 +27,7 @@ struct MultistartOutcome {
 };
 
 // spec.seed must be set. Adds "multistart" to the result and prints the waterfall.
-MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work);
+MultistartOutcome run_multistart(LongRun& long_run, const MultistartSpec& spec, const StartWork& work);
 
 // "412 simulations, 6.9 s in all 20 starts": the words for an optimisation's effort.
 std::string effort(const Run& run, long simulations, double wall_seconds);

@@ -17,6 +17,7 @@
 #include "app/starts/sweep_blocks.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
+#include "optim/machine/process_pool.hpp"
 
 namespace mbsopt::inline app {
 namespace {

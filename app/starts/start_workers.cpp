@@ -4,17 +4,18 @@
 
 #include <algorithm>
 #include <chrono>
-#include <iterator>
-#include <numeric>
+#include <optional>
+#include <set>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "app/results/case_results.hpp"
 #include "app/terminal/interrupt.hpp"
+#include "optim/machine/process_pool.hpp"
 
 namespace mbsopt::inline app {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // mpirun kills a second after its request to end. All results must be written before.
 constexpr std::chrono::milliseconds kPatience{300};
@@ -40,25 +41,22 @@ Json work_message(const Run& run, const Json& task, int workers) {
 }
 
 // The other ranks as rank 0 sees them.
-class OtherRanks {
+class OtherRanks : public RemoteWorkers {
  public:
-  OtherRanks(Ranks& ranks, int workers) : ranks_(ranks), workers_(workers), busy_(ranks_size(), 0) {}
+  OtherRanks(Ranks& ranks, int workers, const Json& work)
+      : ranks_(ranks), workers_(workers), busy_(static_cast<std::size_t>(ranks.size()), 0) {
+    tell(work);
+  }
 
-  void tell(const Json& message) {
-    for (int rank = 1; rank < ranks_.size(); ++rank) ranks_.send(rank, json_text(message));
-  }
-  bool idle() const {
-    return std::all_of(busy_.begin(), busy_.end(), [](int jobs) { return jobs == 0; });
-  }
   // Gives the job to the rank with the fewest running starts, if one has room.
-  bool start(int job) {
+  bool start(int job) override {
     const auto least = std::min_element(busy_.begin() + 1, busy_.end());
     if (*least >= workers_) return false;
     ranks_.send(static_cast<int>(least - busy_.begin()), json_text(Json{{"start", job}}));
     ++*least;
     return true;
   }
-  std::vector<JobReply> ended() {
+  std::vector<JobReply> ended() override {
     std::vector<JobReply> replies;
     while (const std::optional<Ranks::Message> message = ranks_.receive()) {
       const Json json = read_json(message->text);
@@ -71,55 +69,66 @@ class OtherRanks {
     }
     return replies;
   }
+  bool idle() const override {
+    return std::ranges::all_of(busy_, [](int jobs) { return jobs == 0; }) ||
+           (stopped_ && Clock::now() - *stopped_ > kPatience);
+  }
+  void stop() override {
+    tell({{"stop", true}});
+    stopped_ = Clock::now();
+  }
 
  private:
-  std::size_t ranks_size() const { return static_cast<std::size_t>(ranks_.size()); }
+  void tell(const Json& message) {
+    for (int rank = 1; rank < ranks_.size(); ++rank) ranks_.send(rank, json_text(message));
+  }
+
+  using Clock = std::chrono::steady_clock;
 
   Ranks& ranks_;
   int workers_;
   std::vector<int> busy_;  // starts under way, per rank
+  std::optional<Clock::time_point> stopped_;
 };
-
-void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int>& starts, const StartWork& work,
-                      const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting) {
-  OtherRanks others(ranks, workers);
-  others.tell(work_message(run, work.task, workers));
-  ProcessPool here(workers, [&](int start) { return json_text(work.record(start)); });
-  auto next = starts.begin();
-  std::optional<Clock::time_point> stopped;
-  const auto fill = [&] {
-    while (!stopped && next != starts.end() && others.start(*next)) ++next;
-    while (!stopped && next != starts.end() && here.has_room() && here.start(*next)) ++next;
-  };
-  fill();
-  while (!here.idle() || !others.idle() || (next != starts.end() && !stopped)) {
-    std::vector<JobReply> replies = here.ended(kPollMilliseconds);
-    std::ranges::move(others.ended(), std::back_inserter(replies));
-    fill();  // before done(), which may wait for a disk
-    for (const JobReply& reply : replies) done(reply);
-    waiting();
-    if (!stopped && interrupted()) {
-      stopped = Clock::now();
-      here.stop(), others.tell({{"stop", true}});
-    }
-    if (stopped && here.idle() && Clock::now() - *stopped > kPatience) break;
-  }
-}
-
-// Under mpirun the number of ranks determines how many starts run at a time.
-int workers_of(const Run& run) { return run.context.ranks && run.context.options.threads == 0 ? 1 : case_threads(run); }
 
 }  // namespace
 
-void compute_starts(Run& run, const std::vector<int>& starts, const StartWork& work,
-                    const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting) {
-  if (run.context.ranks) return compute_on_ranks(run, *run.context.ranks, workers_of(run), starts, work, done, waiting);
+bool compute_starts(LongRun& long_run, int first, int last, const StartWork& work,
+                    const std::function<void(const Json& record)>& done, const std::function<void()>& waiting) {
+  Run& run = long_run.run;
+  std::set<int> finished;
+  read_record([&] {
+    for (const Json& record : long_run.earlier().of("start")) finished.insert(record.at("start").get<int>());
+  });
+  std::vector<int> starts;
+  for (int start = first; start < last; ++start)
+    if (!finished.contains(start)) starts.push_back(start);
+  std::size_t whole = 0;
+  const auto keep = [&](const JobReply& reply) {
+    const Json record = reply.ok ? read_json(reply.text)
+                                 : Json{{"start", reply.job},
+                                        {"status", interrupted() ? "stopped" : "failed"},
+                                        {"message", reply.text},
+                                        {"objective", nullptr}};
+    if (record["status"] != "stopped") {
+      ++whole;
+      if (reply.ok) long_run.add("start", record);
+    }
+    done(record);
+  };
+  Ranks* const ranks = run.context.ranks;
+  // Under mpirun the number of ranks determines how many starts run at a time.
+  const int workers = ranks && run.context.options.threads == 0 ? 1 : case_threads(run);
+  std::optional<OtherRanks> others;
+  if (ranks) others.emplace(*ranks, workers, work_message(run, work.task, workers));
   run_in_processes(
-      starts, workers_of(run), [&](int start) { return json_text(work.record(start)); }, done,
+      starts, workers, [&](int start) { return json_text(work.record(start)); }, keep,
       [&] {
         waiting();
         return !interrupted();
-      });
+      },
+      others ? &*others : nullptr);
+  return whole == starts.size();
 }
 
 }  // namespace mbsopt::inline app

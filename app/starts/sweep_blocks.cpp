@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "app/files/journal.hpp"
@@ -84,38 +83,24 @@ Json record_of_block(const Problem& problem, const SweepPoints& points, bool gra
 
 }  // namespace
 
-std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& points, long seed) {
+std::vector<SweepRow> swept(LongRun& long_run, const SweepPoints& points, long seed) {
+  Run& run = long_run.run;
   std::vector<SweepRow> rows(points.values.size());
   const std::size_t size = block_size(rows.size());
+  const std::size_t blocks = (rows.size() + size - 1) / size;
+  std::size_t done = 0;
   const auto take = [&](const Json& record) {
-    std::size_t i = size * record.at("start").get<std::size_t>();
-    for (const Json& row : record.at("rows")) rows.at(i++) = row_of(row);
+    const std::size_t first = size * record.at("start").get<std::size_t>(), end = std::min(first + size, rows.size());
+    ++done;
+    if (record.at("status") == "failed")
+      for (std::size_t i = first; i < end; ++i) rows[i] = {true, record.at("message").get<std::string>()};
+    std::size_t i = first;
+    for (const Json& row : record.value("rows", Json::array())) rows.at(i++) = row_of(row);
   };
-  std::set<int> finished;
-  read_record([&] {
-    for (const Json& record : long_run.earlier().starts) take(record), finished.insert(record.at("start").get<int>());
-  });
-  const int blocks = static_cast<int>((rows.size() + size - 1) / size);
-  std::vector<int> jobs;
-  for (int block = 0; block < blocks; ++block)
-    if (!finished.contains(block)) jobs.push_back(block);
-  std::size_t done = finished.size();
-  const auto show = [&] { run.progress.fraction("sweep", static_cast<double>(done) / static_cast<double>(blocks)); };
-  compute_starts(
-      run, jobs, sweep_work(run.problem, task_of(run.context.options.sweep, seed)),
-      [&](const JobReply& reply) {
-        if (!reply.ok) {  // a worker crashed; it may succeed next time
-          for (std::size_t i = size * static_cast<std::size_t>(reply.job), k = 0;
-               !interrupted() && k < size && i + k < rows.size(); ++k)
-            rows[i + k].done = true, rows[i + k].message = reply.text;
-          return;
-        }
-        const Json record = read_json(reply.text);
-        take(record);
-        if (record["status"] == "ok") long_run.add("start", record);
-        ++done;
-      },
-      show);
+  read_record([&] { std::ranges::for_each(long_run.earlier().of("start"), take); });
+  compute_starts(long_run, 0, static_cast<int>(blocks),
+                 sweep_work(run.problem, task_of(run.context.options.sweep, seed)), take,
+                 [&] { run.progress.fraction("sweep", static_cast<double>(done) / static_cast<double>(blocks)); });
   run.progress.finish();
   return rows;
 }

@@ -1,5 +1,5 @@
 // The points of a sweep, computed block by block. A block corresponds to a start of a multistart. It runs in a worker
-// process or on another rank (start_workers.hpp), and its record is a line of the journal:
+// process or on another rank, and its record is a line of the journal (start_workers.hpp):
 //
 //   {"start": 3, "status": "ok", "rows": [{"psi": [0.2, 1.1], "true": [null, 1.2], "psi_rho": [[...], [...]]},
 //                                         {"failed": "why"}]}
@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "app/run/long_run.hpp"
 #include "app/run/sweep_points.hpp"
 #include "app/starts/start_workers.hpp"
 
@@ -19,13 +18,13 @@ namespace mbsopt::inline app {
 struct SweepRow {
   bool done = false;
   std::string message;  // why there are no values
-  Eigen::VectorXd psi;
-  std::vector<std::optional<double>> true_values;
-  Eigen::MatrixXd psi_rho;  // empty unless gradients are requested
+  Eigen::VectorXd psi = {};
+  std::vector<std::optional<double>> true_values = {};
+  Eigen::MatrixXd psi_rho = {};  // empty unless gradients are requested
 };
 
 // Returns a row per point, in their order. The journal gives those of earlier runs.
-std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& points, long seed);
+std::vector<SweepRow> swept(LongRun& long_run, const SweepPoints& points, long seed);
 
 // The blocks, from the task of this process or another one.
 StartWork sweep_work(const Problem& problem, const Json& task);

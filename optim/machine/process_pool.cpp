@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cstring>
 #include <exception>
+#include <iterator>
 #include <optional>
 #include <stdexcept>
 
@@ -21,7 +22,7 @@
 namespace mbsopt::inline optim {
 namespace {
 
-constexpr int kPollMilliseconds = 50;
+constexpr int kPollMilliseconds = 50, kPollRemoteMilliseconds = 5;
 // Container runtimes kill 10 s after their request to end. This leaves half of it to write the results.
 constexpr std::chrono::seconds kGrace{5};
 using Worker = ProcessPool::Worker;
@@ -142,21 +143,25 @@ void ProcessPool::tell(int signal) const {
 }
 
 void run_in_processes(const std::vector<int>& jobs, int workers, const std::function<std::string(int)>& work,
-                      const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on) {
+                      const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on,
+                      RemoteWorkers* others) {
   ProcessPool pool(workers, work);
   auto next = jobs.begin();
   bool stopping = false;
+  const auto start = [&](int job) { return (others && others->start(job)) || (pool.has_room() && pool.start(job)); };
   const auto fill = [&] {
-    while (!stopping && next != jobs.end() && pool.has_room() && pool.start(*next)) ++next;
+    while (!stopping && next != jobs.end() && start(*next)) ++next;
   };
   fill();
-  while (!pool.idle() || (next != jobs.end() && !stopping)) {
-    const std::vector<JobReply> replies = pool.ended(kPollMilliseconds);
+  while (!pool.idle() || (others && !others->idle()) || (next != jobs.end() && !stopping)) {
+    std::vector<JobReply> replies = pool.ended(others ? kPollRemoteMilliseconds : kPollMilliseconds);
+    if (others) std::ranges::move(others->ended(), std::back_inserter(replies));
     fill();  // before done(), which may wait for a disk
     for (const JobReply& reply : replies) done(reply);
     if (!stopping && go_on && !go_on()) {
       stopping = true;
       pool.stop();
+      if (others) others->stop();
     }
   }
 }

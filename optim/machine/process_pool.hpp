@@ -58,10 +58,20 @@ class ProcessPool {
   std::optional<Clock::time_point> kill_at_;
 };
 
+// Workers elsewhere, which take jobs before the processes of this machine do.
+struct RemoteWorkers {
+  virtual ~RemoteWorkers() = default;
+  virtual bool start(int job) = 0;            // false: none has room
+  virtual std::vector<JobReply> ended() = 0;  // does not wait
+  virtual bool idle() const = 0;              // none is at work, or none is waited for any more
+  virtual void stop() = 0;
+};
+
 // Runs all jobs in so many processes; done runs here, in any order. It calls go_on about every 50 ms. If go_on returns
 // false, running jobs get SIGTERM and may still reply, and no other job begins. If the system gives fewer processes
-// than workers, it uses these. Throws std::runtime_error if the system gives none.
+// than workers, it uses these. Throws std::runtime_error if the system gives none. others may be null.
 void run_in_processes(const std::vector<int>& jobs, int workers, const std::function<std::string(int job)>& work,
-                      const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on = {});
+                      const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on = {},
+                      RemoteWorkers* others = nullptr);
 
 }  // namespace mbsopt::inline optim

@@ -280,9 +280,9 @@ TEST_CASE("least squares that is interrupted keeps its best design, and goes on 
   options.simulation_progress = [&](double) { return ++calls <= allowed; };
   const DesignResult whole = run_design(problem, options);
   REQUIRE(whole.status == SolverStatus::converged);
-  std::vector<Json> points;
-  const auto keep = [&](const char*, const Json& point) { points.push_back(point); };
-  JsonPointRecords none({}, {}, keep);
+  JournalRecords recorded;
+  const auto keep = [&](const std::string& kind, const Json& content) { recorded[kind].push_back(content); };
+  JsonRecords none({}, keep);
   options.records = &none;
   allowed = calls / 2, calls = 0;
   const DesignResult part = run_design(problem, options);
@@ -292,8 +292,8 @@ TEST_CASE("least squares that is interrupted keeps its best design, and goes on 
   CHECK(part.objective_final == Approx(part.history.back().objective));
   CHECK(part.variables[0].value != part.variables[0].initial);
   CHECK(part.evaluations < whole.evaluations);
-  REQUIRE(static_cast<long>(points.size()) == part.evaluations);
-  JsonPointRecords known(std::exchange(points, {}), {}, keep);
+  REQUIRE(static_cast<long>(recorded["point"].size()) == part.evaluations);
+  JsonRecords known(std::exchange(recorded, {}), keep);
   options.records = &known, allowed = std::numeric_limits<long>::max();
   const DesignResult rest = run_design(problem, options);
   CHECK(rest.rho == whole.rho);

@@ -63,6 +63,26 @@ bool is_beginning(const std::vector<Json>& of, const std::vector<Json>& found) {
   return found.size() <= of.size() && std::equal(found.begin(), found.end(), of.begin());
 }
 
+std::vector<double> numbers_of(const Json& asked, const char* key) {
+  const Json numbers = asked.is_object() ? asked.value(key, Json()) : Json();
+  const bool is_list = numbers.is_array() && std::ranges::all_of(numbers, [](const Json& x) { return x.is_number(); });
+  return is_list ? numbers.get<std::vector<double>>() : std::vector<double>();
+}
+
+// Whatever was asked, what is recalled has the sizes that fit, or nothing is recalled.
+void recall_all(JsonRecords& records, const Json& asked) {
+  const std::vector<double> x = numbers_of(asked, "x"), u = numbers_of(asked, "u");
+  const auto vector = [](const std::vector<double>& v) {
+    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
+  };
+  NlpPoint point;
+  for (const Wanted wanted : {Wanted::values, Wanted::derivatives}) records.recall(vector(x), wanted, point);
+  const Eigen::VectorXd unknowns = vector(u);
+  Experiment::Residuals residuals;
+  if (records.recall({0, unknowns, numbers_of(asked, "sigma")}, residuals))
+    expect(residuals.z_u.cols() == unknowns.size(), "residuals of another size", "");
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -78,22 +98,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     Journal journal(folder.path(), Json{{"program", "mbsopt"}});
     for (const Json& record : records) journal.add("point", record);
   }
-  expect(read_journal(folder.path()).points == records, "records that do not read back as they were written", text);
+  expect(read_journal(folder.path()).of("point") == records, "records that do not read back as they were written",
+         text);
   std::string damaged = content_of_regular_file(file);
   const std::size_t at = (data[0] + 256u * data[size - 1]) % damaged.size();
   damaged[at] = static_cast<char>(data[size / 2]);
   write(file, damaged);
   refused_in_words(damaged, [&] {
-    expect(is_beginning(records, read_journal(folder.path()).points), "a damaged record is read", damaged);
+    expect(is_beginning(records, read_journal(folder.path()).of("point")), "a damaged record is read", damaged);
   });
   // The records, as if their checksums fitted.
-  std::vector<Json> points, hessians, residuals;
-  for (const Json& line : records) {
-    if (line.contains("point")) points.push_back(line["point"]);
-    if (line.contains("hessians")) hessians.push_back(line["hessians"]);
-    if (line.contains("residuals")) residuals.push_back(line["residuals"]);
-  }
-  refused_in_words(text, [&] { JsonPointRecords(points, hessians, [](const char*, const Json&) {}); });
-  refused_in_words(text, [&] { JsonResidualRecords(residuals, [](const Json&) {}); });
+  JournalRecords of_kinds;
+  for (const Json& line : records)
+    for (const char* kind : {"point", "hessians", "residuals"})
+      if (line.contains(kind)) of_kinds[kind].push_back(line[kind]);
+  refused_in_words(text, [&] {
+    JsonRecords read(of_kinds, [](const std::string&, const Json&) {});
+    for (const Json& point : of_kinds["point"]) recall_all(read, point.at("asked"));
+    for (const Json& residuals : of_kinds["residuals"]) recall_all(read, residuals.at("asked"));
+  });
   return 0;
 }

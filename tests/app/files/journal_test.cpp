@@ -63,12 +63,13 @@ TEST_CASE("journal: what was added is read again, and a run goes on where it was
   const std::string text = small_journal(folder.path);
   const JournalContent whole = read_journal(folder.path);
   CHECK(whole.header.at("input") == "../rod.json");
-  REQUIRE(whole.points.size() == 3);
-  CHECK(whole.points[1].at("f") == 2.25);
+  REQUIRE(whole.of("point").size() == 3);
+  CHECK(whole.of("point")[1].at("f") == 2.25);
   write_text(folder.path / kJournalFile, text.substr(0, text.size() - 10));
   const JournalContent cut_off = read_journal(folder.path);
-  CHECK(cut_off.points.size() == 2);
-  Journal(folder.path, cut_off).add("point", {{"x", {3.0}}, {"derivatives", false}, {"f", 9.0}, {"c", Json::array()}});
+  CHECK(cut_off.of("point").size() == 2);
+  Journal(folder.path, cut_off.end)
+      .add("point", {{"x", {3.0}}, {"derivatives", false}, {"f", 9.0}, {"c", Json::array()}});
   CHECK(content_of(folder.path / kJournalFile) == text);
 }
 
@@ -79,7 +80,7 @@ TEST_CASE("journal: evaluations are flushed every 100 ms and at the end, iterate
   {
     Journal journal(folder.path, kHeader);
     for (int i = 0; i < 200; ++i) journal.add(i % 2 ? "point" : "residuals", {{"f", i}});
-    CHECK(read_journal(folder.path).points.size() == 100);  // the kernel has them
+    CHECK(read_journal(folder.path).of("point").size() == 100);  // the kernel has them
     CHECK(flushes <= (std::chrono::steady_clock::now() - begin) / std::chrono::milliseconds(100));
     for (const char* kind : {"iterate", "start", "ended"}) {
       const int before = flushes;
@@ -94,7 +95,7 @@ TEST_CASE("journal: evaluations are flushed every 100 ms and at the end, iterate
   }
   CHECK(flushes >= 2);  // the end
   flushes = 0;
-  { Journal(folder.path, read_journal(folder.path)); }
+  { Journal(folder.path, read_journal(folder.path).end); }
   CHECK(flushes == 0);
 }
 
@@ -108,7 +109,7 @@ TEST_CASE("journal: no single flipped bit goes unseen", "[journal]") {
     INFO("byte " << i);
     if (i + 1 == text.size()) {  // without its end the last line counts as cut off
       CHECK(refusal(folder.path, damaged).empty());
-      CHECK(read_journal(folder.path).points.size() == 2);
+      CHECK(read_journal(folder.path).of("point").size() == 2);
     } else {
       CHECK_THAT(refusal(folder.path, damaged), Contains("journal.jsonl: "));
       if (i > text.find('\n')) CHECK_THAT(refusal(folder.path, damaged), Contains("is damaged"));
@@ -153,7 +154,7 @@ TEST_CASE("journal: a file that is none of ours is never overwritten, nor what a
   fs::remove(journal);
   small_journal(folder.path);
   CHECK_NOTHROW(Journal(folder.path, kHeader));  // of an earlier run
-  CHECK(read_journal(folder.path).points.empty());
+  CHECK(read_journal(folder.path).of("point").empty());
 }
 
 TEST_CASE("sha256_of gives the values of FIPS 180-4", "[journal]") {

@@ -64,7 +64,7 @@ TEST_CASE("multistart: the same result from 1, 2 and 4 workers, with a waterfall
     const auto& objective = record.at("objective");
     CHECK((objective.is_null() || objective.get<double>() >= before));
     before = objective.is_null() ? INFINITY : objective.get<double>();
-    CHECK_FALSE(record.contains("points"));
+    CHECK_FALSE(record.contains("recorded"));
     if (record.at("start") == 0) CHECK(record.at("from").at("k") == 20);
   }
   CHECK(starts.size() == 8);
