@@ -353,11 +353,12 @@ int identify_command(const CommandContext& context) {
   if (context.options.preflight) return preflight(run, start);
   LongRun long_run(run);
   const BestStart best = from_best_start(long_run, whole);
-  if (interrupted() && run.problem.identification->multistart)
-    return stopped_within_starts(run, long_run, best.problem);
+  const char* const kept = run.problem.identification->multistart && interrupted() ? "best of the starts" : "best fit";
   long_run.begin();
   IdentificationResult fit = fitted(long_run, best.problem, whole, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
+  if (fit.history.empty())  // it was stopped before its first evaluation
+    fit.cost_initial = fit.cost_final = std::numeric_limits<double>::quiet_NaN();
   set_units(fit, cut.problem, data);
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, fit.simulations, fit.wall_seconds));
@@ -371,7 +372,7 @@ int identify_command(const CommandContext& context) {
   FittedMotion motion;
   if (!interrupted() && before.simulation.ok()) motion = fitted_motion(run, needed, data, fit);
   if (fit.status == SolverStatus::stopped || interrupted()) {
-    long_run.stopped("optimized.json holds the best fit so far");
+    long_run.stopped(fmt::format("optimized.json holds the {} so far", kept));
   } else if (!fit.ok()) {
     long_run.failed(fit.status, fit.message);
     if (other) run.warn("--compare: is skipped, since the fit did not converge");

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "app/results/objective_units.hpp"
-#include "app/results/optimized_problem.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "optim/fit/nearest_turn.hpp"
@@ -94,18 +93,6 @@ BestStart from_best_start(LongRun& long_run, const std::vector<CsvTable>& data) 
   const MultistartOutcome outcome = run_multistart(long_run, spec, start_work(problem, data, *spec.seed));
   return {outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object()), outcome.simulations,
           outcome.wall_seconds};
-}
-
-int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best) {
-  std::vector<NewValue> values;
-  for (const Parameter& p : parameters_of(best.scene, best.identification->variables))
-    values.push_back({"", p.name, p.value});
-  for (const ExperimentSpec& experiment : best.identification->experiments) {
-    for (const auto& [name, value] : experiment.overrides) values.push_back({experiment.name, name, value});
-  }
-  run.write("optimized.json", optimized_problem_text(run, values));
-  long_run.stopped("optimized.json holds the best of the starts so far");
-  return long_run.finish();
 }
 
 void describe_given(const Problem& given, IdentificationResult& fit) {

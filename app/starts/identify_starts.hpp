@@ -25,9 +25,6 @@ StartWork identify_start_work(const Problem& problem, const Json& task);
 // The records of the experiments, in their order, on the turn nearest to the model. moved receives what was moved.
 std::vector<CsvTable> data_of(const Problem& problem, std::vector<std::string>* moved = nullptr);
 
-// Ends a run that was interrupted before the final fit began. best is that of from_best_start(). Returns the exit code.
-int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best);
-
 // Sets "initial" of each parameter to its given value, not to that of the best start.
 void describe_given(const Problem& given, IdentificationResult& fit);
 

@@ -398,8 +398,18 @@ TEST_CASE("resume: an identification that was interrupted between its starts goe
   killer.join();
   INFO(outcome.err);
   REQUIRE(outcome.exit_code == kInterrupted);
-  CHECK(json_of(out / "result.json").at("status") == "interrupted");
-  CHECK(fs::exists(out / "optimized.json"));
+  const auto part = json_of(out / "result.json");
+  CHECK(part.at("status") == "interrupted");
+  CHECK_THAT(outcome.err, Contains("holds the best of the starts so far"));
+  const auto& best = part.at("multistart").at("waterfall").at(0);
+  for (const auto& [name, value] : best.at("parameters").items()) {
+    CHECK(part.at("parameters").at(name).at("value").get<double>() == Approx(value.get<double>()).epsilon(1e-12));
+    CHECK(json_of(out / "optimized.json").at("parameters").at(name).at("value") ==
+          part.at("parameters").at(name).at("value"));
+  }
+  CHECK(part.at("parameters").at("k").at("initial") == 60);
+  CHECK(part.at("optimizer").at("objective_final").is_null());
+  CHECK_THAT(content_of(out / "report.html"), Contains("interrupted"));
   REQUIRE(run_command({"resume", out.string()}).exit_code == kDone);
   CHECK(outcome_of(out) == outcome_of(folder.path / "whole"));
 }
