@@ -87,8 +87,7 @@ VectorXd reflection(const Defects& at, const VectorXd& sizes, const VectorXd& lo
   A.bottomRows(n).diagonal().setConstant(kShortest);
   VectorXd b = VectorXd::Zero(m + n);
   b.head(m) = -at.e(open).array() - at.e.maxCoeff();
-  return sizes.cwiseProduct(
-      bounded_linear_least_squares(RowBlocks(A), b, lower.cwiseQuotient(sizes), upper.cwiseQuotient(sizes)));
+  return sizes.cwiseProduct(bounded_linear_least_squares(A, b, lower.cwiseQuotient(sizes), upper.cwiseQuotient(sizes)));
 }
 
 }  // namespace

@@ -1,20 +1,39 @@
 #include "optim/solver/bounded_linear_least_squares.hpp"
 
+#include <Eigen/SparseQR>
 #include <algorithm>
 #include <vector>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using SparseMatrix = Eigen::SparseMatrix<double>;
 
+constexpr Index kDense = 60;     // columns, up to which a dense decomposition costs less
 constexpr double kZero = 1e-13;  // of a gradient, relative to its column and to b: rounding of some hundred products
+
+// The solution in these columns.
+VectorXd solution_in(const SparseMatrix& A, const VectorXd& b, const std::vector<Index>& columns) {
+  if (A.cols() <= kDense) return least_squares(MatrixXd(A)(Eigen::all, columns), b);
+  SparseMatrix taken(A.rows(), static_cast<Index>(columns.size()));
+  for (Index j = 0; j < taken.cols(); ++j) {
+    taken.startVec(j);
+    for (SparseMatrix::InnerIterator entry(A, columns[static_cast<std::size_t>(j)]); entry; ++entry)
+      taken.insertBack(entry.row(), j) = entry.value();
+  }
+  taken.finalize();
+  return Eigen::SparseQR<SparseMatrix, Eigen::COLAMDOrdering<int>>(taken).solve(b);
+}
 
 class ActiveSet {
  public:
-  ActiveSet(const RowBlocks& A, const VectorXd& b, const VectorXd& lower, const VectorXd& upper)
-      : A_(A), b_(b), lower_(lower), upper_(upper), d_(VectorXd::Zero(A.columns())) {
+  ActiveSet(const SparseMatrix& A, const VectorXd& b, const VectorXd& lower, const VectorXd& upper)
+      : A_(A), b_(b), lower_(lower), upper_(upper), d_(VectorXd::Zero(A.cols())) {
     const VectorXd g = gradient();
     for (Index k = 0; k < d_.size(); ++k)
       if (!pushes_out(k, g(k))) free_.push_back(k);
@@ -28,7 +47,7 @@ class ActiveSet {
   }
 
  private:
-  VectorXd gradient() const { return A_.transposed_times(A_ * d_ - b_); }
+  VectorXd gradient() const { return A_.transpose() * VectorXd(A_ * d_ - b_); }
   // Returns whether the variable is at a bound beyond which the sum would fall. A variable with equal bounds cannot
   // move.
   bool pushes_out(Index k, double g) const {
@@ -41,7 +60,7 @@ class ActiveSet {
     const Index n = static_cast<Index>(free_.size());
     VectorXd others = d_;
     for (Index i = 0; i < n; ++i) others(at(i)) = 0;
-    const VectorXd solution = A_.solve(b_ - A_ * others, free_)(free_);
+    const VectorXd solution = solution_in(A_, b_ - A_ * others, free_);
     VectorXd parts = VectorXd::Constant(n, 1);  // of the way to the solution, up to its bound
     for (Index i = 0; i < n; ++i) {
       const double from = d_(at(i)), to = solution(i);
@@ -64,7 +83,7 @@ class ActiveSet {
 
   bool release() {
     const VectorXd g = gradient();
-    const VectorXd lengths = b_.norm() * A_.column_norms();
+    const VectorXd lengths = b_.norm() * column_norms(A_);
     Index best = -1;
     double most = kZero;
     for (Index k = 0; k < d_.size(); ++k) {
@@ -79,7 +98,7 @@ class ActiveSet {
 
   Index at(Index i) const { return free_[static_cast<std::size_t>(i)]; }
 
-  const RowBlocks& A_;
+  const SparseMatrix& A_;
   const VectorXd &b_, &lower_, &upper_;
   VectorXd d_;
   std::vector<Index> free_;
@@ -87,9 +106,19 @@ class ActiveSet {
 
 }  // namespace
 
-VectorXd bounded_linear_least_squares(const RowBlocks& A, const VectorXd& b, const VectorXd& lower,
+VectorXd column_norms(const SparseMatrix& A) {
+  const VectorXd squares = A.cwiseAbs2().transpose() * VectorXd::Ones(A.rows());
+  return squares.cwiseSqrt();
+}
+
+VectorXd bounded_linear_least_squares(const SparseMatrix& A, const VectorXd& b, const VectorXd& lower,
                                       const VectorXd& upper) {
   return ActiveSet(A, b, lower, upper).solve();
+}
+
+VectorXd bounded_linear_least_squares(const MatrixXd& A, const VectorXd& b, const VectorXd& lower,
+                                      const VectorXd& upper) {
+  return bounded_linear_least_squares(SparseMatrix(A.sparseView()), b, lower, upper);
 }
 
 }  // namespace mbsopt::inline optim

@@ -17,6 +17,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using SparseMatrix = Eigen::SparseMatrix<double>;
 
 constexpr double kFirstDamping = 1e-4;
 constexpr double kLeastDamping = 1e-16;  // its root is the rounding of the factors
@@ -33,41 +34,28 @@ constexpr int kWeighings = 100;  // of one step; each lowers its cost, so fewer 
 
 struct LinearModel {
   VectorXd q;
-  RowBlocks R;  // with q a triangle per part, of the weighted residuals: |z + J d|^2 = |q + R d|^2 + constant
+  SparseMatrix R;  // with q a triangle per part, of the weighted residuals: |z + J d|^2 = |q + R d|^2 + constant
   VectorXd gradient;
   VectorXd D;      // lengths of the columns, or more
   VectorXd units;  // steps are measured by: D, or one length for all
   double size;     // half the weighted sum of squares
 
   LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point)
-      : LinearModel(point, problem.weights(point.z).cwiseSqrt(), problem.parts) {}
+      : LinearModel(problem, point, problem.weights(point.z).cwiseSqrt()) {}
   // w holds square roots of the weights.
-  LinearModel(const LeastSquaresPoint& point, const VectorXd& w, const std::vector<Dependence>& parts)
-      : R(parts.empty() ? triangles(point, w, {{all(point.z.size()), all(point.z_x.cols())}})
-                        : triangles(point, w, parts),
-          point.z_x.cols()),
-        gradient(R.transposed_times(q)),
-        D(R.column_norms()),
+  LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point, const VectorXd& w)
+      : R(triangles(point, w, problem.parts)),
+        gradient(R.transpose() * q),
+        D(column_norms(R)),
         units(D),
         size(0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
-  MatrixXd squares() const {  // J'J
-    MatrixXd H(D.size(), D.size());
-    for (Index k = 0; k < D.size(); ++k) H.col(k) = R.transposed_times(R * VectorXd(VectorXd::Unit(D.size(), k)));
-    return H;
-  }
   double promised(const VectorXd& d) const { return 0.5 * (q.squaredNorm() - (q + R * d).squaredNorm()); }
 
  private:
-  static std::vector<Index> all(Index count) {
-    std::vector<Index> indices(static_cast<std::size_t>(count));
-    std::iota(indices.begin(), indices.end(), Index{0});
-    return indices;
-  }
-
   // Sets q.
-  std::vector<RowBlock> triangles(const LeastSquaresPoint& point, const VectorXd& w,
-                                  const std::vector<Dependence>& parts) {
-    std::vector<RowBlock> blocks;
+  SparseMatrix triangles(const LeastSquaresPoint& point, const VectorXd& w, std::vector<Dependence> parts) {
+    if (parts.empty()) parts = {{all(point.z.size()), all(point.z_x.cols())}};
+    std::vector<Eigen::Triplet<double, Index>> entries;
     q.resize(point.z.size());
     Index row = 0;
     for (const Dependence& part : parts) {
@@ -77,14 +65,35 @@ struct LinearModel {
       J_z.rightCols(1) = w(part.rows).cwiseProduct(point.z(part.rows));
       const Index rows = std::min(J_z.rows(), n);
       const MatrixXd T = triangular_factor(std::move(J_z)).topRows(rows);
-      blocks.push_back({part.variables, T.leftCols(n)});
+      for (Index j = 0; j < n; ++j)
+        for (Index i = 0; i < std::min(rows, j + 1); ++i)
+          entries.emplace_back(row + i, part.variables[static_cast<std::size_t>(j)], T(i, j));
       q.segment(row, rows) = T.col(n);
       row += rows;
     }
     q.conservativeResize(row);
-    return blocks;
+    SparseMatrix R_of_parts(row, point.z_x.cols());
+    R_of_parts.setFromTriplets(entries.begin(), entries.end());
+    return R_of_parts;
+  }
+  static std::vector<Index> all(Index count) {
+    std::vector<Index> indices(static_cast<std::size_t>(count));
+    std::iota(indices.begin(), indices.end(), Index{0});
+    return indices;
   }
 };
+
+// The matrix of |R D^-1 e|^2 + lambda |e|^2.
+SparseMatrix scaled_and_damped(const SparseMatrix& R, const VectorXd& D, double lambda) {
+  SparseMatrix A(R.rows() + D.size(), D.size());
+  for (Index k = 0; k < D.size(); ++k) {
+    A.startVec(k);
+    for (SparseMatrix::InnerIterator entry(R, k); entry; ++entry) A.insertBack(entry.row(), k) = entry.value() / D(k);
+    A.insertBack(R.rows() + k, k) = std::sqrt(lambda);
+  }
+  A.finalize();
+  return A;
+}
 
 class Search {
  public:
@@ -247,8 +256,7 @@ class Search {
     if (last_step_.size() > 0) return bent_step(model, d, lambda);
     for (int i = 0; i < kWeighings && has_weights(); ++i) {
       const VectorXd w = problem_.weights(point_.z + point_.z_x * d).cwiseSqrt();
-      const VectorXd before =
-          std::exchange(d, weighed_step(LinearModel(point_, w, problem_.parts), model.units, lambda));
+      const VectorXd before = std::exchange(d, weighed_step(LinearModel(problem_, point_, w), model.units, lambda));
       if (model.units.cwiseProduct(d - before).norm() <= kWeighed * model.units.cwiseProduct(d).norm()) break;
     }
     return d;
@@ -281,7 +289,8 @@ class Search {
     const VectorXd D = model.units.unaryExpr([](double length) { return length > 0 ? length : 1; });
     const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
     const VectorXd inverse = D.cwiseInverse();
-    MatrixXd H = inverse.asDiagonal() * (model.squares() + learnt_.S.matrix()) * inverse.asDiagonal();
+    MatrixXd H =
+        inverse.asDiagonal() * (MatrixXd(model.R.transpose() * model.R) + learnt_.S.matrix()) * inverse.asDiagonal();
     H.diagonal().array() += lambda;
     MatrixXd L = cholesky_factor(H);
     while (L.size() == 0) {
@@ -291,7 +300,7 @@ class Search {
       L = cholesky_factor(H);
     }
     const VectorXd b = -L.triangularView<Eigen::Lower>().solve(inverse.cwiseProduct(model.gradient));
-    return bounded_linear_least_squares(RowBlocks(MatrixXd(L.transpose())), b, lower, upper).cwiseQuotient(D);
+    return bounded_linear_least_squares(MatrixXd(L.transpose()), b, lower, upper).cwiseQuotient(D);
   }
 
   // Sets one length for all variables in units of their ranges: the smallest of their columns.
@@ -312,7 +321,7 @@ class Search {
 
   VectorXd weighed_step(const LinearModel& model, const VectorXd& lengths, double lambda) const {
     const VectorXd D = lengths.unaryExpr([](double length) { return length > 0 ? length : 1; });
-    const RowBlocks A = model.R.scaled_and_damped(D, lambda);  // of D d: columns of length one
+    const SparseMatrix A = scaled_and_damped(model.R, D, lambda);  // of D d: columns of length one
     const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
     VectorXd b = VectorXd::Zero(model.q.size() + D.size());
     b.head(model.q.size()) = -model.q;

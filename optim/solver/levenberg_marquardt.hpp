@@ -9,8 +9,8 @@
 // that met the model's promise, by the rule of Nielsen, report IMM-REP-1999-05, Technical University of Denmark. After
 // another step it rises until the step is shortened to the minimum of a parabola along it.
 //
-// If the problem declares which residuals depend on which variables, factors are those of its parts (row_blocks.hpp).
-// The cost of a step is then at most linear in their number.
+// If the problem declares which residuals depend on which variables, each part is reduced to a triangle, and the step
+// takes their sparse QR.
 //
 // If residuals stay large (`large_residuals`), J'J is only a part of the second derivatives. The rest, S, is learnt
 // from gradients (residual_curvature.hpp). Along a curved valley the last step s, from J to J+, shows how residuals

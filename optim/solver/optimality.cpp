@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/linear/dense.hpp"
+#include "optim/solver/bounded_linear_least_squares.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
@@ -29,54 +29,11 @@ struct Multiplier {
   double slack;
 };
 
-}  // namespace
-
+// min |A z - b| subject to z >= 0.
 VectorXd non_negative_least_squares(const MatrixXd& A, const VectorXd& b) {
-  const Index n = A.cols();
-  VectorXd z = VectorXd::Zero(n);
-  std::vector<Index> passive;
-  std::vector<bool> tried(static_cast<std::size_t>(n), false);
-  const double noise = 1e-14 * (A.size() > 0 ? A.cwiseAbs().maxCoeff() : 0) * b.lpNorm<1>();
-  for (Index round = 0; round < 3 * n + 3; ++round) {
-    const VectorXd w = A.transpose() * (b - A * z);
-    Index entering = -1;
-    for (Index j = 0; j < n; ++j) {
-      if (tried[static_cast<std::size_t>(j)] || std::find(passive.begin(), passive.end(), j) != passive.end()) continue;
-      if (w(j) > noise && (entering < 0 || w(j) > w(entering))) entering = j;
-    }
-    if (entering < 0) break;
-    passive.push_back(entering);
-    VectorXd s = least_squares(A(Eigen::all, passive), b);
-    if (s(s.size() - 1) <= 0) {  // by rounding: its column is one of those already in
-      passive.pop_back();
-      tried[static_cast<std::size_t>(entering)] = true;
-      continue;
-    }
-    while (s.size() > 0 && s.minCoeff() <= 0) {
-      const VectorXd from = z(passive);
-      double part = 1;  // of the way to s that keeps z >= 0
-      for (Index j = 0; j < s.size(); ++j)
-        if (s(j) <= 0) part = std::min(part, from(j) / (from(j) - s(j)));
-      z(passive) += part * (s - from);
-      std::vector<Index> kept;
-      for (Index j = 0; j < s.size(); ++j) {
-        const Index k = passive[static_cast<std::size_t>(j)];
-        if (s(j) <= 0 && z(k) <= 1e-15 * std::abs(s(j)) + std::numeric_limits<double>::min())
-          z(k) = 0;
-        else
-          kept.push_back(k);
-      }
-      if (kept.size() == passive.size()) break;
-      passive = std::move(kept);
-      s = least_squares(A(Eigen::all, passive), b);
-    }
-    z(passive) = s.cwiseMax(0);
-    std::fill(tried.begin(), tried.end(), false);
-  }
-  return z;
+  const VectorXd none = VectorXd::Constant(A.cols(), std::numeric_limits<double>::infinity());
+  return bounded_linear_least_squares(A, b, VectorXd::Zero(A.cols()), none);
 }
-
-namespace {
 
 // Near bounds as columns: sign * gradient of a constraint. A step out of a bound near x costs nothing.
 struct NearBounds {

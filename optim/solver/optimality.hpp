@@ -4,8 +4,8 @@
 //   Lagrangian's gradient   r = s f_x + c_x' S y      s, S: the program's f_scale and c_scale, y: multipliers
 //   y_i >= 0 near an upper bound of c_i, <= 0 near a lower one, of any sign on an equality, else 0
 //
-// The multipliers minimise r (non-negative least squares: Lawson and Hanson, "Solving Least Squares Problems" (1974),
-// chapter 23). A component of r may point out of a bound at x. Then
+// The multipliers minimise r (non-negative least squares: bounded_linear_least_squares.hpp). A component of r may point
+// out of a bound at x. Then
 //
 //   optimality = max( |P(x - r) - x|_inf, max_i |y_i| S_i slack_i ),       P: projection on the bounds
 //
@@ -48,8 +48,5 @@ struct Conflict {
   double residual = 0;             // |sum|/|V_x|: near 0 where the point is such a point
 };
 Conflict conflict(const NonlinearProgram& problem, const Eigen::VectorXd& x, const NlpPoint& point, double tolerance);
-
-// min |A z - b| subject to z >= 0.
-Eigen::VectorXd non_negative_least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 
 }  // namespace mbsopt::inline optim

@@ -101,3 +101,45 @@ TEST_CASE("variables that cannot move stay", "[bounded]") {
   const VectorXd b = VectorXd::Ones(2), zero = VectorXd::Zero(2);
   CHECK(bounded_linear_least_squares(A, b, zero, zero) == zero);
 }
+
+TEST_CASE("non-negative least squares: against all subsets of columns", "[bounded]") {
+  std::srand(GENERATE(range(1u, 30u)));
+  const MatrixXd A = MatrixXd::Random(5, 4);
+  const VectorXd b = VectorXd::Random(5);
+  const VectorXd none = VectorXd::Constant(4, kNone), z = bounded_linear_least_squares(A, b, VectorXd::Zero(4), none);
+  CHECK(z.minCoeff() >= 0);
+  double least = b.norm();
+  for (unsigned subset = 1; subset < 16; ++subset) {
+    MatrixXd part(5, 0);
+    for (int j = 0; j < 4; ++j) {
+      if (!(subset >> j & 1u)) continue;
+      part.conservativeResize(5, part.cols() + 1);
+      part.rightCols(1) = A.col(j);
+    }
+    const VectorXd s = part.colPivHouseholderQr().solve(b);
+    if (s.minCoeff() >= 0) least = std::min(least, (part * s - b).norm());
+  }
+  CHECK((A * z - b).norm() == Approx(least).epsilon(1e-10));
+}
+
+TEST_CASE("bounded least squares of many parts: free variables have no gradient, held ones are pressed on their bounds",
+          "[bounded]") {
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal;
+  constexpr Index parts = 40, n = 2 * parts + 2;  // two columns of each part, two that all share
+  MatrixXd A = MatrixXd::Zero(5 * parts, n);
+  for (Index part = 0; part < parts; ++part)
+    for (Index row = 5 * part; row < 5 * part + 5; ++row)
+      for (const Index column : {2 * part, 2 * part + 1, n - 2, n - 1}) A(row, column) = normal(generator);
+  VectorXd b(A.rows()), bounds(n);
+  for (double& value : b) value = normal(generator);
+  for (double& bound : bounds) bound = 0.2 * std::abs(normal(generator));
+  const VectorXd none = VectorXd::Constant(n, kNone);
+  CHECK((bounded_linear_least_squares(A, b, -none, none) - A.householderQr().solve(b)).norm() < 1e-12);
+  const VectorXd d = bounded_linear_least_squares(A, b, -bounds, bounds), gradient = A.transpose() * (A * d - b);
+  for (Index k = 0; k < n; ++k) {
+    CHECK(std::abs(d(k)) <= bounds(k));
+    if (d(k) > -bounds(k)) CHECK(gradient(k) < 1e-12);
+    if (d(k) < bounds(k)) CHECK(gradient(k) > -1e-12);
+  }
+}

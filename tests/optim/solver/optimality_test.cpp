@@ -90,23 +90,3 @@ TEST_CASE("a multiplier of the wrong sign is no excuse", "[optimality]") {
   problem.c_lower(0) = 2 - 1e-4, problem.c_upper(0) = 10;  // not quite touched
   CHECK(optimality(problem, vector({2}), at(problem, vector({2}))) == Approx(1e-4));
 }
-
-TEST_CASE("non-negative least squares: against all subsets of columns", "[optimality]") {
-  std::srand(GENERATE(range(1u, 30u)));
-  const Eigen::MatrixXd A = Eigen::MatrixXd::Random(5, 4);
-  const Eigen::VectorXd b = Eigen::VectorXd::Random(5);
-  const Eigen::VectorXd z = non_negative_least_squares(A, b);
-  CHECK(z.minCoeff() >= 0);
-  double least = b.norm();
-  for (unsigned subset = 1; subset < 16; ++subset) {
-    Eigen::MatrixXd part(5, 0);
-    for (int j = 0; j < 4; ++j) {
-      if (!(subset >> j & 1u)) continue;
-      part.conservativeResize(5, part.cols() + 1);
-      part.rightCols(1) = A.col(j);
-    }
-    const Eigen::VectorXd s = part.colPivHouseholderQr().solve(b);
-    if (s.minCoeff() >= 0) least = std::min(least, (part * s - b).norm());
-  }
-  CHECK((A * z - b).norm() == Approx(least).epsilon(1e-10));
-}
