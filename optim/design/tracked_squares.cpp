@@ -9,7 +9,7 @@
 #include "core/mechanism/scene_programs.hpp"
 #include "core/run/run_arguments.hpp"
 #include "core/simulate/simulation.hpp"
-#include "optim/solver/limit_multipliers.hpp"
+#include "optim/solver/multipliers.hpp"
 
 namespace mbsopt::inline optim {
 

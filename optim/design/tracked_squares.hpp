@@ -3,7 +3,7 @@
 //   z = sqrt(w_c w) (sensor(t_k) - column_k),     z_x by one tangent-linear run       w_c: weight of the load case
 //
 // so that Levenberg-Marquardt (levenberg_marquardt.hpp) takes the place of a general optimiser. Limits of `samples` of
-// the same run are further rows, in units of their size; limit_multipliers.hpp holds them.
+// the same run are further rows, in units of their size; multipliers.hpp holds them.
 #pragma once
 
 #include <functional>

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "optim/solver/equality_multipliers.hpp"
+#include "optim/solver/multipliers.hpp"
 
 namespace mbsopt::inline optim {
 namespace {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "core/expression/did_you_mean.hpp"
-#include "optim/solver/equality_multipliers.hpp"
+#include "optim/solver/multipliers.hpp"
 
 namespace mbsopt::inline optim {
 namespace {

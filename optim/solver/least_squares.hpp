@@ -3,7 +3,7 @@
 //   minimise 1/2 sum rho(z_i(x)^2) + 1/2 sum z_j(x)^2   subject to   x_lower <= x <= x_upper,   z_k(x) = 0
 //
 // rho is the loss (robust_loss.hpp). `plain` residuals, j, are squared for any loss. The last `equalities` rows, k, are
-// no residuals but equations between the variables (equality_multipliers.hpp).
+// no residuals but equations between the variables (multipliers.hpp).
 //
 // Residuals of a scale group have a common unknown standard deviation s. The fit eliminates it:
 //

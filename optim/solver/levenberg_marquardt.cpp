@@ -410,23 +410,4 @@ LeastSquaresResult solve_least_squares(LeastSquaresProblem& problem, const Vecto
   return Search(problem, options).run(x_start);
 }
 
-long search_on(LeastSquaresProblem& round, const LeastSquaresOptions& options, LeastSquaresResult& all) {
-  const bool is_first = all.z_initial.size() == 0;
-  LeastSquaresOptions of_round = options;
-  of_round.max_iterations -= all.iterations;
-  if (options.progress)
-    of_round.progress = [&](LeastSquaresProgress p) {
-      if (!is_first && p.iteration == 0) return true;  // known from before
-      p.iteration += all.iterations;
-      return options.progress(p);
-    };
-  LeastSquaresResult found = solve_least_squares(round, all.x, of_round);
-  const long failed = found.failed_evaluations;
-  found.iterations += all.iterations, found.failed_evaluations += all.failed_evaluations;
-  if (!all.first_error.empty()) found.first_error = std::move(all.first_error);
-  if (!is_first) found.z_initial = std::move(all.z_initial);
-  all = std::move(found);
-  return failed;
-}
-
 }  // namespace mbsopt::inline optim

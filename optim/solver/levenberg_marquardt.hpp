@@ -72,9 +72,4 @@ struct LeastSquaresOptions {
 LeastSquaresResult solve_least_squares(LeastSquaresProblem& problem, const Eigen::VectorXd& x_start,
                                        const LeastSquaresOptions& options = {});
 
-// One more search of a method that needs several: from all.x, with the iterations that are left. `all` becomes its
-// result, with the iterations and failures of all searches, and the residuals of the first start. Returns the search's
-// own failures.
-long search_on(LeastSquaresProblem& round, const LeastSquaresOptions& options, LeastSquaresResult& all);
-
 }  // namespace mbsopt::inline optim

@@ -1,6 +1,6 @@
 // Least squares with equations between the variables: published minima of Hock and Schittkowski, "Test Examples for
 // Nonlinear Programming Codes" (1981).
-#include "optim/solver/equality_multipliers.hpp"
+#include "optim/solver/multipliers.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,6 +1,6 @@
 // Least squares within limits: published minima of Hock and Schittkowski, "Test Examples for Nonlinear Programming
 // Codes" (1981), and of More, Garbow and Hillstrom, ACM Transactions on Mathematical Software 7 (1981) 17.
-#include "optim/solver/limit_multipliers.hpp"
+#include "optim/solver/multipliers.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
