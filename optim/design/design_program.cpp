@@ -6,7 +6,7 @@
 
 #include "optim/objective/gauss_newton.hpp"
 #include "optim/objective/hessian.hpp"
-#include "optim/solver/evaluated_points.hpp"
+#include "optim/solver/nlp_search.hpp"
 
 namespace mbsopt::inline optim {
 namespace {

@@ -13,7 +13,7 @@
 #include "optim/design/design_result.hpp"
 #include "optim/objective/case_evaluator.hpp"
 #include "optim/problem/problem.hpp"
-#include "optim/solver/evaluated_points.hpp"
+#include "optim/solver/nlp_search.hpp"
 
 namespace mbsopt::inline optim {
 

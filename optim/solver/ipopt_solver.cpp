@@ -169,7 +169,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     if (iterate_.size() == 0 || !evaluate(iterate_)) return !out_of_evaluations_;  // it is in memory
     const double distance = optimality(problem_, iterate_, *point_);
     if (!report(*point_, distance)) return false;
-    if (points_.feasible(*point_)) look_at_iterate(distance);
+    if (feasible(*point_)) look_at_iterate(distance);
     return !out_of_evaluations_ && end_ == SearchEnd::none;
   }
 
@@ -268,11 +268,11 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   // Returns whether a feasible point on the way is better than Ipopt's end point by more than the tolerance.
   bool passed_a_better_point() {
     if (final_.size() == 0 || !evaluate(final_)) return false;
-    return best_is_feasible() && (point_->f - points_.best().f) * problem_.f_scale > tolerance_;
+    return best_is_feasible() && (point_->f - best().f) * problem_.f_scale > tolerance_;
   }
 
   void go_on_from_best() {
-    x_start_ = points_.best_x();
+    x_start_ = best_x();
     iterations_before_ = result_.iterations;
     if (end_ == SearchEnd::creeping) second_order_ = false, newton_until_ = result_.iterations;
     recent_.clear(), end_ = SearchEnd::none;
@@ -311,10 +311,10 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     }
   }
 
-  // Interior points may leave the bounds by a rounding error; EvaluatedPoints moves them back.
+  // Interior points may leave the bounds by a rounding error; NlpSearch moves them back.
   bool evaluate(const Eigen::VectorXd& x) {
-    point_ = &points_.at(x, Wanted::derivatives);
-    if (points_.is_new() && point_->ok) look(*point_);
+    point_ = &at(x, Wanted::derivatives);
+    if (is_new() && point_->ok) look(*point_);
     return point_->ok;
   }
 
@@ -388,7 +388,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   }
 
   void keep_iterate() {
-    iterate_ = points_.x();
+    iterate_ = x();
     secants_.add(iterate_, point_->f_x);
   }
 

@@ -57,7 +57,7 @@ class NloptSearch : private NlpSearch {
 
   void run(const VectorXd& x_start) {
     result_.x = x_start;
-    const NlpPoint& start = points_.at(x_start, wanted_);
+    const NlpPoint& start = at(x_start, wanted_);
     took(start);
     if (!start.ok) return end_refused();
     const unsigned n = static_cast<unsigned>(problem_.variables());
@@ -92,7 +92,7 @@ class NloptSearch : private NlpSearch {
     if (is_creeping_) {
       const Optimizer finish(nlopt_create(NLOPT_LD_SLSQP, n), nlopt_destroy);
       hand_over_to(finish.get(), x_start);
-      x = points_.best_x();
+      x = best_x();
       code = optimized(x);
       opt_ = outer.get();
     }
@@ -128,12 +128,12 @@ class NloptSearch : private NlpSearch {
   nlopt_result optimized(VectorXd& x) {
     nlopt_result code = NLOPT_SUCCESS;
     for (int round = 0; round <= kFreshStarts; ++round) {
-      const double f_before = points_.best().f;
+      const double f_before = best().f;
       double f = 0;
       code = nlopt_optimize(opt_, x.data(), &f);
       // A line search that stalls with its learnt curvature may progress without it.
-      if (ended_ || (is_creeping_ && !handed_over_) || !stalled() || !(points_.best().f < f_before)) break;
-      x = points_.best_x();
+      if (ended_ || (is_creeping_ && !handed_over_) || !stalled() || !(best().f < f_before)) break;
+      x = best_x();
     }
     return code;
   }
@@ -150,8 +150,8 @@ class NloptSearch : private NlpSearch {
   void look_for_gain() {
     if (method_.constraints != ConstraintSupport::inequalities || is_creeping_ || ended_) return;
     if (result_.evaluations < next_look_) return;
-    const double f = points_.best().f;
-    is_creeping_ = points_.feasible(points_.best()) && last_look_f_ - f <= kLeastGain * std::abs(f);
+    const double f = best().f;
+    is_creeping_ = best_is_feasible() && last_look_f_ - f <= kLeastGain * std::abs(f);
     next_look_ = result_.evaluations + kCreeping, last_look_f_ = f;
     if (is_creeping_ && opt_) nlopt_force_stop(opt_);
   }
@@ -201,7 +201,7 @@ class NloptSearch : private NlpSearch {
     NloptSearch& self = *static_cast<NloptSearch*>(data);
     double f = 0;
     guarded(self, [&] {
-      const NlpPoint& point = self.at(VectorIn(x, n));
+      const NlpPoint& point = self.answer_at(VectorIn(x, n));
       f = self.problem_.f_scale * point.f;
       if (f_x) VectorView(f_x, n) = self.problem_.f_scale * point.f_x;
     });
@@ -212,7 +212,7 @@ class NloptSearch : private NlpSearch {
     NloptSearch& self = sides.search;
     std::fill(values, values + m, 0);
     guarded(self, [&] {
-      const NlpPoint& point = self.at(VectorIn(x, n));
+      const NlpPoint& point = self.answer_at(VectorIn(x, n));
       for (unsigned j = 0; j < m; ++j) {
         const Side& side = sides.all[j];
         const double scale = side.sign * self.problem_.c_scale(side.constraint);
@@ -223,13 +223,13 @@ class NloptSearch : private NlpSearch {
   }
 
   // The point for NLopt, or its substitute if it cannot be evaluated.
-  const NlpPoint& at(const VectorXd& x) {
+  const NlpPoint& answer_at(const VectorXd& x) {
     if (!x.allFinite())
       end(SolverStatus::failed,
           fmt::format("{} asked for a point that is not a number{}", method_.name, result_.failures()));
     if (ended_) return last_good_;
-    const NlpPoint& point = points_.at(x, wanted_);
-    if (points_.is_new()) took(point);
+    const NlpPoint& point = at(x, wanted_);
+    if (is_new()) took(point);
     if (point.ok) return point;
     set_stand_in();
     return stand_in_;
@@ -238,15 +238,14 @@ class NloptSearch : private NlpSearch {
   void took(const NlpPoint& point) {
     if (point.ok) {
       f_worst_ = last_good_x_.size() > 0 ? std::max(f_worst_, point.f) : point.f;
-      last_good_ = point, last_good_x_ = points_.x();
+      last_good_ = point, last_good_x_ = x();
       if (is_local_with_gradients() && look(point) <= tolerance_ && !ended_) end_optimal(), force_stop();
-      if (points_.is_better()) took_better(point);
+      if (is_best()) took_better(point);
     } else if (point.abandoned) {
       stop_on_request();
-    } else if (!method_.global && points_.failed_in_a_row() >= kFailuresInARow) {
-      end(SolverStatus::no_progress,
-          fmt::format("no further progress: {} in a row failed, the last: {}",
-                      counted(points_.failed_in_a_row(), "evaluation"), points_.last_error()));
+    } else if (!method_.global && failed_in_a_row_ >= kFailuresInARow) {
+      end(SolverStatus::no_progress, fmt::format("no further progress: {} in a row failed, the last: {}",
+                                                 counted(failed_in_a_row_, "evaluation"), last_error_));
     }
     if (result_.evaluations >= max_evaluations_) end_at_limit(max_evaluations_, "evaluation");
     look_for_gain();
@@ -254,7 +253,7 @@ class NloptSearch : private NlpSearch {
 
   void took_better(const NlpPoint& point) {
     if (result_.evaluations > 1) ++result_.iterations;  // not the start
-    if (!report(point, method_.gradients ? optimality(problem_, points_.x(), point) : kUnknown)) stop_on_request();
+    if (!report(point, method_.gradients ? optimality(problem_, x(), point) : kUnknown)) stop_on_request();
     if (options_.max_iterations && result_.iterations >= *options_.max_iterations)
       end_at_limit(*options_.max_iterations, "iteration");
   }
@@ -264,7 +263,7 @@ class NloptSearch : private NlpSearch {
   bool stalled() {
     if (!is_local_with_gradients()) return false;
     take_solution();
-    return points_.feasible(result_.point) && optimality(problem_, result_.x, result_.point) > kAcceptable * tolerance_;
+    return feasible(result_.point) && optimality(problem_, result_.x, result_.point) > kAcceptable * tolerance_;
   }
 
   // If a point fails, its function value is high, so that the method returns. With gradients it rises along the step by
@@ -274,12 +273,12 @@ class NloptSearch : private NlpSearch {
     stand_in_ = last_good_;
     const double least = 1e-3 * std::max(std::abs(last_good_.f), 1 / problem_.f_scale);
     if (!method_.gradients) {
-      stand_in_.f = f_worst_ + std::max(f_worst_ - points_.best().f, least);
+      stand_in_.f = f_worst_ + std::max(f_worst_ - best().f, least);
       return;
     }
-    const VectorXd d = points_.x() - last_good_x_;
+    const VectorXd d = x() - last_good_x_;
     const double rise = std::max(std::abs(last_good_.f_x.dot(d)), least);
-    stand_in_.f = std::max(last_good_.f, points_.best().f) + rise;
+    stand_in_.f = std::max(last_good_.f, best().f) + rise;
     stand_in_.f_x = 2 * rise / std::max(d.squaredNorm(), std::numeric_limits<double>::min()) * d;
   }
 
@@ -304,7 +303,7 @@ class NloptSearch : private NlpSearch {
 
   void end_searched(const std::string& limit) {
     take_solution();
-    if (!points_.feasible(result_.point))
+    if (!feasible(result_.point))
       return end(SolverStatus::infeasible,
                  fmt::format("infeasible: none of {} satisfies the constraints; relax them, or search longer "
                              "(max_evaluations){}",
@@ -319,7 +318,7 @@ class NloptSearch : private NlpSearch {
     if (code == NLOPT_OUT_OF_MEMORY) return end(SolverStatus::failed, "not enough memory");
     if (code == NLOPT_INVALID_ARGS)
       return end(SolverStatus::failed, fmt::format("{} refused the problem{}", method_.name, library));
-    if (!points_.feasible(result_.point)) return end_infeasible();
+    if (!feasible(result_.point)) return end_infeasible();
     if (code == NLOPT_MAXEVAL_REACHED) {  // requests of known points reached the limit
       if (method_.global) return end_searched(counted(max_evaluations_, "evaluation"));
       return end(SolverStatus::no_progress,

@@ -22,8 +22,8 @@ struct Noisy : NonlinearProgram {
 
 struct Search : NlpSearch {
   Search(NonlinearProgram& problem, NlpResult& result) : NlpSearch(problem, NloptOptions{}, result) {}
-  double look(double x) { return NlpSearch::look(points_.at(vector({x}), Wanted::derivatives)); }
-  double best_x() const { return points_.best_x()(0); }
+  double look(double x) { return NlpSearch::look(at(vector({x}), Wanted::derivatives)); }
+  double best_x() const { return NlpSearch::best_x()(0); }
   using NlpSearch::has_solution, NlpSearch::take_solution;
 };
 
