@@ -39,10 +39,8 @@ void require_memory() {
 // Why a round ends before Ipopt would end it.
 //   optimal     an iterate is stationary to the tolerance, by the measure of all methods (optimality.hpp)
 //   stalled     ten iterations have changed f by noise only, which a line search would try to lower without end
-//   creeping    20 iterations have gained less than 1 % of f, none of them anywhere near a stationary point; without
-//               constraints only, under which f tells less
-enum class SearchEnd { none, optimal, stalled, creeping };
-constexpr int kStalled = 10, kCreeping = 20;  // iterations
+enum class SearchEnd { none, optimal, stalled };
+constexpr int kStalled = 10;  // iterations
 
 struct Iterate {
   Eigen::VectorXd x;
@@ -53,11 +51,7 @@ struct Iterate {
 class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
  public:
   IpoptSearch(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options, NlpResult& result)
-      : NlpSearch(problem, options, result),
-        x_start_(x_start),
-        options_(options),
-        secants_(1 / problem.f_scale),
-        second_order_(options.second_order) {
+      : NlpSearch(problem, options, result), x_start_(x_start), options_(options), secants_(1 / problem.f_scale) {
     result_.x = x_start;
   }
 
@@ -73,7 +67,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
       if (application->Initialize("") != Ipopt::Solve_Succeeded) break;  // "": no options file is read
       end_round(application->OptimizeTNLP(this));
       const bool ended = result_.status == SolverStatus::converged || result_.status == SolverStatus::no_progress;
-      if (end_ != SearchEnd::creeping && !(ended && passed_a_better_point())) break;
+      if (!ended || !passed_a_better_point()) break;
       go_on_from_best();
     }
     finish();
@@ -197,11 +191,11 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     list.SetIntegerValue("print_level", 0);
     list.SetStringValue("sb", "yes");  // no banner
     list.SetIntegerValue("max_iter", std::max(0, options_.max_iterations - result_.iterations));
-    list.SetStringValue("hessian_approximation", second_order_ ? "exact" : "limited-memory");
+    list.SetStringValue("hessian_approximation", options_.second_order ? "exact" : "limited-memory");
     list.SetIntegerValue("limited_memory_max_history", options_.history);
     // Newton steps converge faster than the barrier falls from its usual 0.1. BFGS needs that time to learn.
-    if (second_order_) list.SetNumericValue("mu_init", 1e-3);
-    if (second_order_ && !constrained) {  // all matrices are positive definite: Newton's steps need no barrier
+    if (options_.second_order) list.SetNumericValue("mu_init", 1e-3);
+    if (options_.second_order && !constrained) {  // all matrices are positive definite: Newton's steps need no barrier
       list.SetNumericValue("mu_init", 0.1 * tolerance_);
       list.SetStringValue("bound_mult_init_method", "mu-based");  // multipliers of 1 would count as curvature
     }
@@ -223,7 +217,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
       for (const char* const push : {"bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"})
         list.SetNumericValue(push, 1e-8);
     } else if (round_ > 0) {  // near the solution
-      if (!second_order_ || constrained) list.SetNumericValue("mu_init", 1e-4);
+      if (!options_.second_order || constrained) list.SetNumericValue("mu_init", 1e-4);
       list.SetNumericValue("bound_push", 1e-6), list.SetNumericValue("bound_frac", 1e-6);
     }
   }
@@ -274,7 +268,6 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   void go_on_from_best() {
     x_start_ = best_x();
     iterations_before_ = result_.iterations;
-    if (end_ == SearchEnd::creeping) second_order_ = false, newton_until_ = result_.iterations;
     recent_.clear(), end_ = SearchEnd::none;
     ++round_;
   }
@@ -295,10 +288,6 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     const SolverStatus status = result_.status;
     if (status == SolverStatus::converged && distance > tolerance_)
       result_.message += fmt::format(" (as Ipopt measures them; by the measure of all methods to {:.1e})", distance);
-    if (newton_until_ > 0)
-      result_.message +=
-          fmt::format("; by L-BFGS from iteration {} on, since steps by Hessians gained less than 1 % in {}",
-                      newton_until_, counted(kCreeping, "iteration"));
     if (!best_is_feasible()) return;
     if ((status == SolverStatus::no_progress || status == SolverStatus::infeasible) &&
         distance <= kAcceptable * tolerance_) {
@@ -318,45 +307,22 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     return point_->ok;
   }
 
-  // Ipopt would continue. A search without progress starts again, a few times. If Newton steps progress slowly, BFGS
-  // replaces them. The iterate is feasible.
+  // Ipopt would continue. The iterate is feasible.
   void look_at_iterate(double distance) {
     if (distance <= tolerance_) {
       end_ = SearchEnd::optimal, final_ = iterate_;
       return;
     }
     recent_.push_back({iterate_, point_->f * problem_.f_scale, distance});
-    if (recent_.size() > kCreeping + 1) recent_.pop_front();
-    if (is_stalled()) {
-      const auto nearest = std::ranges::min_element(last(kStalled), recent_.cend(), {}, &Iterate::distance);
-      end_ = SearchEnd::stalled, final_ = nearest->x;
-    } else if (second_order_ && round_ < kFreshStarts && problem_.constraints() == 0 && is_creeping()) {
-      end_ = SearchEnd::creeping;
-    }
-  }
-
-  // The first of the last count + 1 iterates; there must be so many.
-  std::deque<Iterate>::const_iterator last(int count) const { return recent_.end() - (count + 1); }
-
-  // The least and the largest f of the last count + 1 iterates.
-  std::pair<double, double> range_of_f(int count) const {
-    const auto [least, most] = std::ranges::minmax_element(last(count), recent_.end(), {}, &Iterate::f);
-    return {least->f, most->f};
+    if (recent_.size() > kStalled + 1) recent_.pop_front();
+    if (is_stalled()) end_ = SearchEnd::stalled, final_ = std::ranges::min_element(recent_, {}, &Iterate::distance)->x;
   }
 
   bool is_stalled() const {
     constexpr double kNoise = 1e-2;  // times the tolerance, relative to f
     if (recent_.size() <= kStalled) return false;
-    const auto [least, most] = range_of_f(kStalled);
-    return most - least <= std::max(tolerance_ * tolerance_, kNoise * tolerance_ * std::abs(most));
-  }
-
-  bool is_creeping() const {
-    constexpr double kLittle = 0.01, kBeside = 0.1;
-    if (recent_.size() <= kCreeping) return false;
-    const auto [least, most] = range_of_f(kCreeping);
-    return most - least <= kLittle * std::abs(most) &&
-           std::ranges::all_of(recent_, [](const Iterate& i) { return i.distance > kBeside; });
+    const auto [least, most] = std::ranges::minmax_element(recent_, {}, &Iterate::f);
+    return most->f - least->f <= std::max(tolerance_ * tolerance_, kNoise * tolerance_ * std::abs(most->f));
   }
 
   // The Hessian of f. If it is not positive definite and there are no constraints, BFGS replaces it: negative curvature
@@ -400,9 +366,8 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   NlpHessians hessians_;
   std::deque<Iterate> recent_;       // of this round, oldest first
   SearchEnd end_ = SearchEnd::none;  // of this round, if it ends here
-  bool second_order_, out_of_evaluations_ = false;
+  bool out_of_evaluations_ = false;
   int round_ = 0, iterations_before_ = 0;
-  int newton_until_ = 0;  // iteration at which BFGS replaced it; 0: never
 };
 
 }  // namespace

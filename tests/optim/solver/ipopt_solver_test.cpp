@@ -369,26 +369,3 @@ TEST_CASE("ipopt: records hold all that exact Hessians take", "[ipopt]") {
   CHECK(again.iterations == first.iterations);
   CHECK(problem.evaluated + problem.asked == 0);
 }
-
-TEST_CASE("ipopt: L-BFGS goes on where steps by Hessians creep", "[ipopt]") {
-  struct Stiff : NonlinearProgram {
-    Stiff() : NonlinearProgram(1, 0) {}
-    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
-      p.f = 1 + x(0) * x(0) / 2;
-      p.f_x = x;
-    }
-    bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>& H) override {
-      H.assign(1, Eigen::MatrixXd::Constant(1, 1, 1e4));  // as of ripples on f
-      return true;
-    }
-  } problem;
-  IpoptOptions options;
-  options.second_order = true;
-  const NlpResult result = solve_with_ipopt(problem, vector({2}), options);
-  INFO(result.message);
-  CHECK(result.status == SolverStatus::converged);
-  CHECK(result.x(0) == Approx(0).margin(1e-6));
-  CHECK(result.iterations > 20);
-  CHECK(result.iterations < 40);
-  CHECK(result.message.find("by L-BFGS from iteration 20 on") != std::string::npos);
-}
