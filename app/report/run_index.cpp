@@ -21,14 +21,14 @@ constexpr const char* kIndexTitle = "Runs";
 // A sweep or a study may keep far more than a comparison needs. Its reading would delay every command by a second.
 constexpr std::size_t kLargest = 20'000'000;  // [bytes] of result.json
 
-struct StoredRun {
+struct IndexedRun {
   std::string folder;
   Json result;
   bool has_report;
 };
 
-std::vector<StoredRun> runs_in(const fs::path& folder) {
-  std::vector<StoredRun> runs;
+std::vector<IndexedRun> runs_in(const fs::path& folder) {
+  std::vector<IndexedRun> runs;
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
     if (!fs::exists(entry.path() / "result.json", ignored)) continue;
@@ -42,7 +42,7 @@ std::vector<StoredRun> runs_in(const fs::path& folder) {
     runs.push_back(
         {entry.path().filename().string(), std::move(result), fs::exists(entry.path() / "report.html", ignored)});
   }
-  std::ranges::sort(runs, {}, &StoredRun::folder);
+  std::ranges::sort(runs, {}, &IndexedRun::folder);
   return runs;
 }
 
@@ -80,13 +80,13 @@ Json compared_numbers(const Json& result) {
 }  // namespace
 
 std::string run_index(const fs::path& folder) {
-  const std::vector<StoredRun> runs = runs_in(folder);
+  const std::vector<IndexedRun> runs = runs_in(folder);
   if (runs.empty()) return {};
   HtmlPage page(kIndexTitle);
   page.heading("All runs");
   std::vector<TableRow> rows;
   Json compared = Json::array();
-  for (const StoredRun& run : runs) {
+  for (const IndexedRun& run : runs) {
     TableCell name(run.folder);
     if (run.has_report) name.link = address_of(run.folder) + "/report.html";
     rows.push_back({name, cell(run.result.value("command", Json())), cell(run.result.value("status", Json())),
