@@ -29,7 +29,7 @@ struct ImportedBody {
 };
 
 struct ImportedJoint {
-  std::string type;  // of the problem format: revolute, translational, spherical, planar, fixed
+  std::string type = {};  // of the problem format: revolute, translational, spherical, planar, fixed
   int body1 = 0, body2 = 0;
   Eigen::Isometry3d between = Eigen::Isometry3d::Identity();  // the frame of body2 in that of body1
   Eigen::Vector3d point = Eigen::Vector3d::Zero(), axis = Eigen::Vector3d::UnitZ();  // in the frame of body2

@@ -50,9 +50,10 @@ const std::vector<ModelAttribute> kMjcf{
 const std::map<std::string, std::string> kMjcfTypes{
     {"hinge", "revolute"}, {"slide", "translational"}, {"ball", "spherical"}, {"free", ""}};
 
-bool is_one_of(const std::string& word, std::initializer_list<const char*> words) {
-  return std::ranges::find(words, word) != words.end();
-}
+using Kinds = std::vector<std::string>;
+const Kinds kOrientations{"quat", "axisangle", "xyaxes", "zaxis", "euler"};  // an element has one of them
+
+bool is_one_of(const std::string& word, const Kinds& words) { return std::ranges::find(words, word) != words.end(); }
 
 // The smallest rotation that moves z there. If it is opposite to z, this is half a turn about x, as in MuJoCo.
 Matrix3d with_z_along(const Vector3d& direction) {
@@ -78,21 +79,21 @@ class MjcfReader : ModelBuilder {
     model_.name = root_.word("model");
     refuse_unread_mechanics(root_);
     for (const ModelElement& node : root_.children("default")) {
-      if (classes_.empty()) outermost_ = node.own("class").value_or(outermost_);
-      add_class(node, node.own("class").value_or(outermost_), "");
+      if (classes_.empty()) outermost_ = node.given("class").value_or(outermost_);
+      add_class(node, node.given("class").value_or(outermost_), "");
     }
     for (const ModelElement& compiler : root_.children("compiler")) read_compiler(compiler);
     for (const ModelElement& option : root_.children("option")) {
-      if (option.own("gravity")) model_.gravity = option.numbers("gravity");
+      if (option.given("gravity")) model_.gravity = option.numbers("gravity");
       const ModelElement flag = option.child("flag");
       for (auto& [name, acts] : acts_)
-        if (flag && flag.own(name)) acts = flag.word(name) == "enable" ? 1 : 0;
+        if (flag && flag.given(name)) acts = flag.word(name) == "enable" ? 1 : 0;
     }
     if (acts_["gravity"] == 0) model_.gravity.setZero();
     for (const char* constraint : {"equality", "frictionloss"}) acts_[constraint] *= acts_["constraint"];
     for (const ModelElement& world : root_.children("worldbody")) {
-      find_sources(world, "");
-      read_contents(contents(world), {0, Isometry3d::Identity(), false});
+      inherit_from_classes(world, "");
+      read_contents(world, {});
     }
     if (total_mass_ > 0) scale_masses();
     for (const ModelElement& equality : root_.children("equality")) {
@@ -104,10 +105,10 @@ class MjcfReader : ModelBuilder {
   }
 
  private:
-  struct Around {  // an element: its body, and its frame in that of the body
-    int body;
-    Isometry3d frame;
-    bool geoms_weigh;  // not those of the world, nor of a body whose <inertial> says its mass
+  struct Place {  // of an element
+    int body = 0;
+    Isometry3d frame = Isometry3d::Identity();  // in that of the body
+    bool geoms_weigh = false;                   // not those of the world, nor of a body whose <inertial> says its mass
   };
 
   // Default classes: an element that omits an attribute takes that of its class, or of the classes around it. An
@@ -123,27 +124,27 @@ class MjcfReader : ModelBuilder {
     for (const ModelElement& child : node.children("default")) add_class(child, child.word("class"), name);
   }
 
-  void find_sources(const ModelElement& element, const std::string& childclass) {
+  void inherit_from_classes(const ModelElement& element, const std::string& childclass) {
     for (const ModelElement& child : element.children()) {
       if (!is_one_of(child.name(), {"body", "frame", "geom", "inertial", "joint", "site"})) continue;
-      std::string name = child.own("class").value_or(childclass);
+      std::string name = child.given("class").value_or(childclass);
       if (name.empty()) name = outermost_;
       if (name != outermost_ && !classes_.contains(name))
         child.error(fmt::format("there is no default class '{}'", name));
       for (; !name.empty(); name = classes_[name].around) {
-        for (const ModelElement& source : classes_[name].elements)
-          if (source.name() == child.name()) child.add_source(source);
+        for (const ModelElement& defaults : classes_[name].elements)
+          if (defaults.name() == child.name()) child.inherit(defaults, kOrientations);
       }
-      find_sources(child, child.own("childclass").value_or(childclass));
+      inherit_from_classes(child, child.given("childclass").value_or(childclass));
     }
   }
 
   void read_compiler(const ModelElement& compiler) {
     compiler.word("coordinate");
-    if (compiler.own("angle")) angle_unit_ = compiler.word("angle") == "degree" ? std::numbers::pi / 180 : 1;
-    if (compiler.own("inertiafromgeom")) inertia_from_geoms_ = compiler.word("inertiafromgeom");
+    if (compiler.given("angle")) angle_unit_ = compiler.word("angle") == "degree" ? std::numbers::pi / 180 : 1;
+    if (compiler.given("inertiafromgeom")) inertia_from_geoms_ = compiler.word("inertiafromgeom");
     if (const double mass = compiler.number("settotalmass"); mass > 0) total_mass_ = mass;
-    if (!compiler.own("eulerseq")) return;
+    if (!compiler.given("eulerseq")) return;
     euler_sequence_ = compiler.word("eulerseq");
     if (euler_sequence_.size() == 3 && euler_sequence_.find_first_not_of("xyzXYZ") == std::string::npos) return;
     compiler.error(fmt::format("eulerseq: is '{}', must be three of x y z X Y Z", euler_sequence_));
@@ -152,79 +153,71 @@ class MjcfReader : ModelBuilder {
 
   struct Placed {
     ModelElement element;
-    Isometry3d frame;  // that of the <frame> around it, in the frame of its body
+    Place place;  // of what is around the element
   };
 
-  // The contents of the world or of a body, in the order of the file. A <frame> only moves and turns its contents.
-  std::vector<Placed> contents(const ModelElement& element, const Isometry3d& frame = Isometry3d::Identity()) const {
+  // The elements of these kinds in the world or a body, in the order of the file. A <frame> only moves and turns its
+  // contents.
+  std::vector<Placed> contents(const ModelElement& element, const Place& place, const Kinds& kinds) const {
     std::vector<Placed> list;
     for (const ModelElement& child : element.children()) {
       if (child.name() == "frame") {
         child.mark_read();
-        const std::vector<Placed> inside = contents(child, frame * placement(child));
+        const std::vector<Placed> inside = contents(child, moved(place, placement(child)), kinds);
         list.insert(list.end(), inside.begin(), inside.end());
       } else if (child.name() == "inertial" && element.name() == "frame") {
         child.error("is in a <frame>; it must be directly in its body");
-      } else {
-        list.push_back({child, frame});
+      } else if (is_one_of(child.name(), kinds)) {
+        child.mark_read();
+        list.push_back({child, place});
       }
     }
     return list;
   }
 
-  void read_contents(const std::vector<Placed>& list, const Around& around) {
-    for (const char* kind : {"geom", "site", "body"}) {
-      for (const auto& [element, frame] : list) {
-        if (element.name() != kind) continue;
-        element.mark_read();
-        const Around inside{around.body, around.frame * frame, around.geoms_weigh};
-        if (element.name() == "geom") read_geom(element, inside);
-        if (element.name() == "site") read_site(element, inside);
-        if (element.name() == "body") read_body(element, inside);
-      }
-    }
+  static Place moved(Place place, const Isometry3d& by) {
+    place.frame = place.frame * by;
+    return place;
   }
 
-  void read_site(const ModelElement& site, const Around& around) {
-    const std::optional<std::string> name = site.own("name");
+  void read_contents(const ModelElement& element, const Place& place) {
+    for (const auto& [geom, around] : contents(element, place, {"geom"})) read_geom(geom, around);
+    for (const auto& [site, around] : contents(element, place, {"site"})) read_site(site, around);
+    for (const auto& [inner, around] : contents(element, place, {"body"}))
+      read_body(inner, moved(around, placement(inner)));
+  }
+
+  void read_site(const ModelElement& site, const Place& around) {
+    const std::optional<std::string> name = site.given("name");
     const Vector3d at = around.frame * Vector3d(site.numbers("pos"));
     if (name && around.body > 0) body(around.body).points.emplace_back(*name, at);
   }
 
-  void read_body(const ModelElement& element, Around around) {
-    around.frame = around.frame * placement(element);
-    const std::string name = element.own("name").value_or(fmt::format("body{}", model_.bodies.size()));
-    const std::vector<Placed> list = contents(element);
-    std::vector<Placed> joints;
-    std::ranges::copy_if(list, std::back_inserter(joints), [](const Placed& p) {
-      return is_one_of(p.element.name(), {"joint", "freejoint"});
-    });
-    if (joints.empty() && around.body > 0) {
-      ImportedBody& carrier = body(around.body);
-      carrier.points.emplace_back(name, around.frame.translation());
+  void read_body(const ModelElement& element, Place place) {
+    const std::string name = element.given("name").value_or(fmt::format("body{}", model_.bodies.size()));
+    const std::vector<Placed> joints = contents(element, {}, {"joint", "freejoint"});
+    if (joints.empty() && place.body > 0) {
+      ImportedBody& carrier = body(place.body);
+      carrier.points.emplace_back(name, place.frame.translation());
       model_.changed.push_back(fmt::format("body '{}' has no joint and is a part of '{}'", name, carrier.name));
     }
     // Each joint lies between two bodies; those before the last one have no mass.
     for (std::size_t k = 1; k <= joints.size(); ++k) {
-      const ModelElement& joint = joints[k - 1].element;
-      joint.mark_read();
-      const std::string joint_name = joint.own("name").value_or(fmt::format("{}_joint{}", name, k));
-      ImportedJoint link;
-      link.body1 = around.body;
-      link.between = around.frame;
-      around.body = add_body(k == joints.size() ? name : name + "_" + joint_name, link.body1, link.between, element);
-      link.body2 = around.body;
-      around.frame.setIdentity();
+      const auto& [joint, around] = joints[k - 1];
+      const std::string joint_name = joint.given("name").value_or(fmt::format("{}_joint{}", name, k));
+      ImportedJoint link{.body1 = place.body, .between = place.frame};
+      link.body2 = add_body(k == joints.size() ? name : name + "_" + joint_name, link.body1, link.between, element);
+      place = {link.body2};
       if (k < joints.size())
         model_.changed.push_back(fmt::format("'{}' has {} joints: '{}' without mass stands between two of them", name,
                                              joints.size(), model_.bodies.back().name));
-      read_joint(joint, joints[k - 1].frame, joint_name, link, joints.size());
+      read_joint(joint, around.frame, joint_name, link, joints.size());
     }
-    placed_.emplace(name, around);
+    placed_.emplace(name, place);
     const ModelElement inertial = element.child("inertial");
-    around.geoms_weigh = inertia_from_geoms_ == "true" || (!inertial && inertia_from_geoms_ == "auto");
-    if (inertial && inertia_from_geoms_ != "true") read_inertial(inertial, around);
-    read_contents(list, around);
+    place.geoms_weigh = inertia_from_geoms_ == "true" || (!inertial && inertia_from_geoms_ == "auto");
+    if (inertial && inertia_from_geoms_ != "true") read_inertial(inertial, place);
+    read_contents(element, place);
   }
 
   // `frame` is that around the joint in its body, which has `count` joints. No class acts on <freejoint>.
@@ -251,26 +244,26 @@ class MjcfReader : ModelBuilder {
     add_joint(name, joint, element, element, type);
   }
 
-  void read_inertial(const ModelElement& inertial, const Around& inside) {
-    const Isometry3d at = inside.frame * placement(inertial);
+  void read_inertial(const ModelElement& inertial, const Place& around) {
+    const Isometry3d at = around.frame * placement(inertial);
     Matrix3d tensor = Matrix3d::Zero();
-    if (inertial.own("fullinertia")) {  // xx yy zz xy xz yz
+    if (inertial.given("fullinertia")) {  // xx yy zz xy xz yz
       const VectorXd J = inertial.numbers("fullinertia");
       tensor << J(0), J(3), J(4), J(3), J(1), J(5), J(4), J(5), J(2);
     } else {
       tensor.diagonal() = inertial.numbers("diaginertia");
     }
-    add_part(body(inside.body), inertial.number("mass"), at.translation(),
+    add_part(body(around.body), inertial.number("mass"), at.translation(),
              at.linear() * tensor * at.linear().transpose(), inertial);
   }
 
-  void read_geom(const ModelElement& element, const Around& around) {
+  void read_geom(const ModelElement& element, const Place& around) {
     const std::string type = element.word("type");
     // The ground has no shape. Its bodies without joints count in settotalmass.
     if (around.body == 0 && !(total_mass_ > 0 && around.geoms_weigh)) return element.mark_read(false);
     if (is_one_of(type, {"plane", "hfield", "sdf"})) return element.mark_read(false);
-    if (type == "mesh" || element.own("mesh")) {
-      if (around.geoms_weigh && !(element.text("mass") && element.number("mass") == 0))
+    if (type == "mesh" || element.given("mesh")) {
+      if (around.geoms_weigh && !(element.given("mass") && element.number("mass") == 0))
         element.error("its mass is that of a mesh, which is not read: give the body an <inertial>");
       return element.mark_read(false);
     }
@@ -278,7 +271,7 @@ class MjcfReader : ModelBuilder {
     if (!geom) return;
     if (around.geoms_weigh) {
       const double density = element.number("density");
-      const double mass = element.text("mass") ? element.number("mass") : density * volume(*geom);
+      const double mass = element.given("mass") ? element.number("mass") : density * volume(*geom);
       const Matrix3d R = geom->at.linear();
       add_part(body(around.body), mass, geom->at.translation(),
                mass * R * unit_inertia(*geom).asDiagonal() * R.transpose(), element);
@@ -286,7 +279,7 @@ class MjcfReader : ModelBuilder {
     if (around.body > 0) body(around.body).shapes.push_back(shape_of(*geom));
   }
 
-  std::optional<Geom> solid(const ModelElement& element, const Around& around, const std::string& type) {
+  std::optional<Geom> solid(const ModelElement& element, const Place& around, const std::string& type) {
     const Eigen::Index count = sizes_of(type);
     if (count == 0) {
       element.error(fmt::format("there is no type '{}' of geoms", type));
@@ -294,8 +287,9 @@ class MjcfReader : ModelBuilder {
     }
     VectorXd size = element.numbers("size");
     Geom geom{.type = type};
-    const bool fromto = element.text("fromto").has_value();
-    if (fromto && element.own("pos")) element.error("pos: must not be given with fromto, not even by a class");
+    const bool fromto = element.given("fromto").has_value();
+    if (fromto && !element.numbers("pos").isZero(0))
+      element.error("pos: must not be given with fromto, not even by a class");
     if (fromto && type != "sphere") {  // the z axis runs from one end to the other
       const VectorXd ends = element.numbers("fromto");
       const Vector3d from = ends.head<3>(), along = Vector3d(ends.tail<3>()) - from;
@@ -327,12 +321,11 @@ class MjcfReader : ModelBuilder {
   }
 
   // Finds a body of the model by an attribute of an equality. If there is none, it reports a finding.
-  std::optional<Around> placed(const ModelElement& element, const char* attribute) {
+  const Place* placed(const ModelElement& element, const char* attribute) {
     const std::string name = element.word(attribute);
-    const auto found = placed_.find(name);
-    if (found != placed_.end()) return found->second;
-    if (element.own(attribute)) element.error(fmt::format("{}: there is no body '{}'", attribute, name));
-    return std::nullopt;
+    if (const auto found = placed_.find(name); found != placed_.end()) return &found->second;
+    if (element.given(attribute)) element.error(fmt::format("{}: there is no body '{}'", attribute, name));
+    return nullptr;
   }
 
   bool is_active(const ModelElement& element) {
@@ -347,20 +340,20 @@ class MjcfReader : ModelBuilder {
   void read_connection(const ModelElement& element) {
     const bool connect = element.name() == "connect";
     const Vector3d anchor = connect ? Vector3d(element.numbers("anchor")) : Vector3d::Zero();  // in the frame of body1
-    if (connect && !element.own("anchor")) return;
-    std::optional<Around> a = placed(element, "body1"), b = placed(element, "body2");
+    if (connect && !element.given("anchor")) return;
+    const Place *a = placed(element, "body1"), *b = placed(element, "body2");
     if (!a || !b || !is_active(element)) return;
     if (a->body == b->body) return element.error("its bodies are one body: no joint lets them move");
-    const Vector3d place = body(a->body).frame * a->frame * anchor;
+    const Vector3d point = body(a->body).frame * a->frame * anchor;
     if (b->body == 0) std::swap(a, b);  // the ground comes first
     const Isometry3d &frame1 = body(a->body).frame, &frame2 = body(b->body).frame;
-    const std::string name = element.own("name").value_or(fmt::format("{}{}", element.name(), element.place().line));
+    const std::string name = element.given("name").value_or(fmt::format("{}{}", element.name(), element.place().line));
     add_joint(name,
               {.type = connect ? "spherical" : "fixed",
                .body1 = a->body,
                .body2 = b->body,
                .between = frame1.inverse() * frame2,
-               .point = frame2.inverse() * place},
+               .point = frame2.inverse() * point},
               element, element, element.name());
   }
 
@@ -368,7 +361,7 @@ class MjcfReader : ModelBuilder {
   // joints.
   void read_joint_tie(const ModelElement& element) {
     const VectorXd c = element.numbers("polycoef");
-    const std::string driven = element.own("joint1").value_or(""), driver = element.own("joint2").value_or("");
+    const std::string driven = element.given("joint1").value_or(""), driver = element.given("joint2").value_or("");
     if (!joint_index_.contains(driven) || !joint_index_.contains(driver))
       return element.error("must tie two joints of hinges or slides: joint1 and joint2");
     if (c.size() < 2 || c(0) != 0 || !c.tail(c.size() - 2).isZero(0))
@@ -379,55 +372,45 @@ class MjcfReader : ModelBuilder {
   Isometry3d placement(const ModelElement& element) const {
     Isometry3d frame = Isometry3d::Identity();
     frame.translation() = element.numbers("pos");
-    std::optional<Matrix3d> found;
-    for (const ModelElement& source : element.sources()) {
-      const std::optional<Matrix3d> own = orientation(source);
-      if (!found) found = own;
-    }
-    frame.linear() = found.value_or(Matrix3d::Identity());
+    frame.linear() = orientation(element);
     return frame;
   }
 
-  // In the notation of the element itself, not of its class.
-  std::optional<Matrix3d> orientation(const ModelElement& element) const {
-    const auto given = [&](const char* attribute) {
-      return element.own(attribute) ? std::optional<VectorXd>(element.numbers(attribute)) : std::nullopt;
-    };
-    if (const auto q = given("quat"))
-      return Quaterniond((*q)(0), (*q)(1), (*q)(2), (*q)(3)).normalized().toRotationMatrix();
-    if (const auto a = given("axisangle")) {
-      const Vector3d axis = a->head<3>().normalized();
+  Matrix3d orientation(const ModelElement& element) const {
+    const auto notation =
+        std::ranges::find_if(kOrientations, [&](const std::string& n) { return element.given(n).has_value(); });
+    if (notation == kOrientations.end()) return Matrix3d::Identity();
+    const VectorXd v = element.numbers(*notation);
+    if (*notation == "quat") return Quaterniond(v(0), v(1), v(2), v(3)).normalized().toRotationMatrix();
+    if (*notation == "axisangle") {
+      const Vector3d axis = v.head<3>().normalized();
       if (axis.norm() == 0) element.error("axisangle: the axis is zero");
-      return Eigen::AngleAxisd(angle_unit_ * (*a)(3), axis).toRotationMatrix();
+      return Eigen::AngleAxisd(angle_unit_ * v(3), axis).toRotationMatrix();
     }
-    if (const auto axes = given("xyaxes")) {
-      const Vector3d x = axes->head<3>().normalized(), y = axes->tail<3>();
-      const Vector3d z = x.cross(y);
+    if (*notation == "zaxis") return with_z_along(v);
+    Matrix3d R = Matrix3d::Identity();
+    if (*notation == "xyaxes") {
+      const Vector3d x = v.head<3>().normalized(), z = x.cross(Vector3d(v.tail<3>()));
       if (z.norm() == 0) element.error("xyaxes: the axes are parallel");
-      Matrix3d R;
       R << x, z.normalized().cross(x), z.normalized();
       return R;
     }
-    if (const auto z = given("zaxis")) return with_z_along(*z);
-    const auto angles = given("euler");
-    if (!angles) return std::nullopt;
-    Matrix3d R = Matrix3d::Identity();
-    for (int k = 0; k < 3; ++k) {  // small letters: about the turned axes; capitals: about the fixed ones
+    for (int k = 0; k < 3; ++k) {  // euler; small letters: about the turned axes; capitals: about the fixed ones
       const char c = euler_sequence_[static_cast<std::size_t>(k)];
-      const Matrix3d turn = rotation((c | 0x20) - 'x', angle_unit_ * (*angles)(k));
+      const Matrix3d turn = rotation((c | 0x20) - 'x', angle_unit_ * v(k));
       R = c >= 'x' ? Matrix3d(R * turn) : Matrix3d(turn * R);
     }
     return R;
   }
 
   std::map<std::string, DefaultClass> classes_;
-  std::string outermost_ = "main";                                                       // MuJoCo's name for this class
-  std::map<std::string, Around> placed_{{"world", {0, Isometry3d::Identity(), false}}};  // bodies of the model by name
-  double angle_unit_ = std::numbers::pi / 180;                                           // compiler: angle
-  std::string euler_sequence_ = "xyz";                                                   // compiler: eulerseq
-  std::string inertia_from_geoms_ = "auto";                                              // compiler: inertiafromgeom
-  double total_mass_ = 0;             // compiler: settotalmass [kg]; 0: none
-  std::map<std::string, double> acts_{// option: flag; 1, or 0 where it is switched off
+  std::string outermost_ = "main";                      // MuJoCo's name for this class
+  std::map<std::string, Place> placed_{{"world", {}}};  // bodies of the model by name
+  double angle_unit_ = std::numbers::pi / 180;          // compiler: angle
+  std::string euler_sequence_ = "xyz";                  // compiler: eulerseq
+  std::string inertia_from_geoms_ = "auto";             // compiler: inertiafromgeom
+  double total_mass_ = 0;                               // compiler: settotalmass [kg]; 0: none
+  std::map<std::string, double> acts_{                  // option: flag; 1, or 0 where it is switched off
                                       {"gravity", 1},
                                       {"passive", 1},
                                       {"constraint", 1},

@@ -80,26 +80,18 @@ void add_dropped(const ModelFile& file, const pugi::xml_node& node, std::vector<
 
 }  // namespace
 
-std::optional<std::string> ModelElement::own(const std::string& attribute) const {
+std::optional<std::string> ModelElement::given(const std::string& attribute) const {
   const pugi::xml_attribute found = node_.attribute(attribute.c_str());
   if (!found) return std::nullopt;
   file_->read.insert(found.internal_object());
+  if (const auto origins = file_->origins.find(found.internal_object()); origins != file_->origins.end())
+    file_->read.insert(origins->second.begin(), origins->second.end());
   return found.value();
-}
-
-// Reads all sources, so that an overridden class is not listed as dropped.
-std::optional<std::string> ModelElement::text(const std::string& attribute) const {
-  std::optional<std::string> value;
-  for (const ModelElement& source : sources()) {
-    const std::optional<std::string> given = source.own(attribute);
-    if (!value) value = given;
-  }
-  return value;
 }
 
 std::string ModelElement::word(const std::string& attribute) const {
   const ModelAttribute& row = row_of(*file_, name(), attribute);
-  const std::string word = text(attribute).value_or(row.otherwise.value_or(""));
+  const std::string word = given(attribute).value_or(row.otherwise.value_or(""));
   if (word.empty() && !row.otherwise) error(fmt::format("has no attribute '{}'", attribute));
   if (row.words.empty() || std::ranges::find(row.words, word) != row.words.end()) return word;
   error(fmt::format("{}: is '{}', must be {}", attribute, word, fmt::join(row.words, " or ")));
@@ -139,16 +131,23 @@ void ModelElement::mark_read(bool read) const {
     file_->read.erase(node_.internal_object());
 }
 
-std::vector<ModelElement> ModelElement::sources() const {
-  std::vector<ModelElement> list{*this};
-  const auto more = file_->sources.find(node_.internal_object());
-  if (more == file_->sources.end()) return list;
-  for (const ModelElement& source : more->second) list.emplace_back(source).mark_read();
-  return list;
-}
-
-void ModelElement::add_source(const ModelElement& element) const {
-  file_->sources[node_.internal_object()].push_back(element);
+void ModelElement::inherit(const ModelElement& from, const std::vector<std::string>& alternatives) const {
+  from.mark_read();
+  const auto is_alternative = [&](const pugi::xml_attribute& a) {
+    return std::ranges::find(alternatives, a.name()) != alternatives.end();
+  };
+  for (const pugi::xml_attribute& offered : from.node_.attributes()) {
+    const std::string name = offered.name();
+    if (name == "name" || name.ends_with("class")) continue;
+    pugi::xml_attribute own = node_.find_attribute([&](const pugi::xml_attribute& a) {
+      return a.name() == name || (is_alternative(a) && is_alternative(offered));
+    });
+    if (!own) {
+      own = pugi::xml_node(node_).append_copy(offered);
+      file_->read.insert(own.internal_object());  // the original is listed if nothing reads it
+    }
+    file_->origins[own.internal_object()].push_back(offered.internal_object());
+  }
 }
 
 Finding ModelElement::place() const {

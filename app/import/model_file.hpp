@@ -43,8 +43,7 @@ class ModelElement {
   explicit operator bool() const { return !node_.empty(); }
 
   std::string name() const { return node_.name(); }
-  std::optional<std::string> own(const std::string& attribute) const;   // as the element gives it
-  std::optional<std::string> text(const std::string& attribute) const;  // or else as the nearest source gives it
+  std::optional<std::string> given(const std::string& attribute) const;
 
   // By the table. A missing attribute, another word or another count of numbers is a finding, and gives "", the first
   // word or zeros. Numbers are finite; of a list with a finding there are none.
@@ -56,9 +55,9 @@ class ModelElement {
   std::vector<ModelElement> children(const std::string& name = "") const;  // without a name: all; marks none as read
   void mark_read(bool read = true) const;                                  // false: it was read, and is not used
 
-  // The element and those that give what it omits, from near to far (default classes of MJCF).
-  std::vector<ModelElement> sources() const;
-  void add_source(const ModelElement& element) const;
+  // Takes the attributes of another element that this one omits, except its name and classes (default classes of MJCF).
+  // An element gives one attribute of `alternatives` only: if it has one, it takes none of them.
+  void inherit(const ModelElement& from, const std::vector<std::string>& alternatives) const;
 
   Finding place() const;                         // its line and its name, "joint 'a'"
   void error(const std::string& message) const;  // adds a finding
@@ -82,8 +81,8 @@ struct ModelFile {
   SourceText source;
   pugi::xml_document document;
   std::vector<ModelAttribute> table;
-  std::unordered_set<const void*> read;  // elements and attributes
-  std::unordered_map<const void*, std::vector<ModelElement>> sources;
+  std::unordered_set<const void*> read;                               // elements and attributes
+  std::unordered_map<const void*, std::vector<const void*>> origins;  // of an attribute: those that are read with it
   std::vector<Finding> findings;
 };
 

@@ -315,6 +315,9 @@ TEST_CASE("an orientation of an MJCF element goes before that of its class", "[i
   CHECK_THAT(finding_of("<mujoco><default><geom fromto='0 0 0 0 0 1'/></default><worldbody><body><joint/>"
                         "<geom type='capsule' size='0.1' pos='1 0 0'/></body></worldbody></mujoco>"),
              Contains("geom: pos: must not be given with fromto"));
+  CHECK_THAT(finding_of("<mujoco><default><geom pos='1 0 0'/></default><worldbody><body><joint/>"
+                        "<geom type='capsule' size='0.1' fromto='0 0 0 0 0 1'/></body></worldbody></mujoco>"),
+             Contains("geom: pos: must not be given with fromto, not even by a class"));
 }
 
 TEST_CASE("a default class that is named as the one around it belongs to it", "[import]") {
