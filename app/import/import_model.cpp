@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "app/import/problem_text.hpp"
+#include "app/import/imported_model.hpp"
 #include "app/json/node.hpp"
 #include "app/json/read_problem.hpp"
 #include "core/start/model_warnings.hpp"
@@ -14,6 +14,16 @@
 namespace mbsopt::inline app {
 namespace {
 
+// The element of the model that a path of the problem file begins with, or an empty place.
+Finding place_of(const std::string& path, const ImportedModel& model) {
+  const std::vector<PathStep> steps = path.empty() ? std::vector<PathStep>{} : parse_path(path);
+  if (steps.size() < 2 || !steps[1].is_index) return {};
+  const std::size_t i = steps[1].index;
+  if (steps[0].key == "bodies" && i + 1 < model.bodies.size()) return model.bodies[i + 1].place;
+  if (steps[0].key == "joints" && i < model.joints.size()) return model.joints[i].place;
+  return {};
+}
+
 // Returns the problem. Findings about a body or a joint name their element of the model.
 Problem checked(const std::string& text, const ImportedModel& model, const std::string& file) {
   try {
@@ -21,15 +31,8 @@ Problem checked(const std::string& text, const ImportedModel& model, const std::
   } catch (const InputError& error) {
     std::vector<Finding> findings = error.findings();
     for (Finding& finding : findings) {
-      Finding place;
-      const std::vector<PathStep> path = finding.path.empty() ? std::vector<PathStep>{} : parse_path(finding.path);
-      if (path.size() >= 2 && path[1].is_index) {
-        const std::size_t i = path[1].index;
-        if (path[0].key == "bodies" && i + 1 < model.bodies.size()) place = model.bodies[i + 1].place;
-        if (path[0].key == "joints" && i < model.joints.size()) place = model.joints[i].place;
-      }
-      const std::string what = finding.path.substr(std::min(finding.path.size(), finding.path.find('.') + 1));
-      if (place.line > 0) finding.path = place.path + ": " + what;
+      const Finding place = place_of(finding.path, model);
+      if (place.line > 0) finding.path = place.path + ": " + finding.path.substr(finding.path.find('.') + 1);
       finding.line = place.line;
       finding.column = place.column;
     }

@@ -1,4 +1,4 @@
-#include "app/import/problem_text.hpp"
+// A model as the text of a problem file.
 
 #include <fmt/format.h>
 
@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "app/files/json_text.hpp"
+#include "app/import/imported_model.hpp"
 #include "app/import/unique_names.hpp"
 #include "core/expression/expression.hpp"
 #include "core/scene/type_table.hpp"

@@ -1,6 +1,7 @@
 // URDF, the robot description of ROS (https://wiki.ros.org/urdf/XML): links and joints that form a tree.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
 
 #include "app/import/geom.hpp"
@@ -57,9 +58,7 @@ class UrdfReader : ModelBuilder {
     // URDF does not define the support of its root. It is fixed here, as in MuJoCo.
     fill(roots[0]);
     model_.changed.push_back(fmt::format("the root link '{}' is fixed to the ground", roots[0].word("name")));
-    for (const auto& [name, link] : links_) {
-      if (!placed_.contains(name)) link.error("is not reached from the root link: joints form a circle");
-    }
+    for (const auto& [name, link] : links_) link.error("is not reached from the root link: joints form a circle");
     for (const ModelElement& joint : root_.children("joint")) {
       if (const ModelElement mimic = joint.child("mimic")) add_mimic(joint.word("name"), mimic);
     }
@@ -99,41 +98,41 @@ class UrdfReader : ModelBuilder {
     return frame;
   }
 
-  // Adds each link to its body, from the root on. The tree may have any depth, so this is no recursion over links.
+  struct Place {  // of a link
+    ModelElement link;
+    int body;
+    Isometry3d frame;  // in that of its body
+  };
+
+  // Adds each link to its body, from the root on, and takes it from links_. The tree may have any depth, so this is no
+  // recursion over links.
   void fill(const ModelElement& root) {
-    struct Waiting {
-      ModelElement link;
-      int body;
-      Isometry3d frame;  // of the link, in that of its body
-    };
-    std::vector<Waiting> waiting{{root, 0, Isometry3d::Identity()}};
+    std::vector<Place> waiting{{root, 0, Isometry3d::Identity()}};
     while (!waiting.empty()) {
-      const Waiting now = waiting.back();
+      const Place now = waiting.back();
       waiting.pop_back();
       const std::string name = now.link.word("name");
-      placed_.insert(name);
       add_link(now.link, now.body, now.frame);
-      std::vector<Waiting> found;
-      for (const ModelElement& joint : children_[name]) {
-        const ModelElement& child = links_.at(joint.child("child").word("link"));
-        const Isometry3d frame = now.frame * origin(joint);
-        const int body = body_of(joint, child, now.body, frame);
-        found.push_back({child, body, body == now.body ? frame : Isometry3d::Identity()});
-      }
-      waiting.insert(waiting.end(), found.rbegin(), found.rend());  // in the order of the file
+      links_.erase(name);
+      const auto first = static_cast<std::ptrdiff_t>(waiting.size());
+      for (const ModelElement& joint : children_[name]) waiting.push_back(carried_by(joint, now));
+      std::reverse(waiting.begin() + first, waiting.end());  // the next is the first in the file
     }
   }
 
-  // between is the frame of the child link in that of the parent's body.
-  int body_of(const ModelElement& element, const ModelElement& child, int parent, const Isometry3d& between) {
+  // Adds the joint and its child's body. The child of a fixed joint becomes a part of the parent's body.
+  Place carried_by(const ModelElement& element, const Place& parent) {
+    const ModelElement child = links_.at(element.child("child").word("link"));
+    const Isometry3d between = parent.frame * origin(element);
     const std::string given = element.word("type"), type = kUrdfTypes.at(given);
     if (type == "fixed") {
-      if (parent > 0)
-        model_.changed.push_back(fmt::format("link '{}' is a part of '{}'", child.word("name"), body(parent).name));
-      return parent;
+      if (parent.body > 0)
+        model_.changed.push_back(
+            fmt::format("link '{}' is a part of '{}'", child.word("name"), body(parent.body).name));
+      return {child, parent.body, between};
     }
-    ImportedJoint joint{.type = type, .body1 = parent, .body2 = 0, .between = between};
-    joint.body2 = add_body(child.word("name"), parent, between, child);
+    ImportedJoint joint{.type = type, .body1 = parent.body, .between = between};
+    joint.body2 = add_body(child.word("name"), parent.body, between, child);
     const ModelElement dynamics = element.child("dynamics");
     if (dynamics) {
       joint.damping = dynamics.number("damping");
@@ -144,7 +143,7 @@ class UrdfReader : ModelBuilder {
       joint.axis = axis ? Vector3d(axis.numbers("xyz")) : Vector3d::UnitX();
     }
     add_joint(element.word("name"), joint, element, dynamics, given);
-    return joint.body2;
+    return {child, joint.body2, Isometry3d::Identity()};
   }
 
   void add_link(const ModelElement& link, int index, const Isometry3d& frame) {
@@ -191,10 +190,9 @@ class UrdfReader : ModelBuilder {
     add_tie(joint, " mimics ", other, mimic.number("multiplier"), mimic);
   }
 
-  std::map<std::string, ModelElement> links_;
+  std::map<std::string, ModelElement> links_;                  // not yet in a body
   std::map<std::string, std::vector<ModelElement>> children_;  // joints of a link
   std::set<std::string> carried_;                              // links that a joint carries
-  std::set<std::string> placed_;
 };
 
 }  // namespace
