@@ -72,4 +72,29 @@ void Findings::throw_if_any() const {
   throw InputError(std::move(all));
 }
 
+PlacedNode PlacedNode::find(std::string_view key) const {
+  const Node* const found = node_->find(key);
+  return found ? PlacedNode(*this, static_cast<std::size_t>(found - node_->items.data())) : PlacedNode();
+}
+
+std::vector<PlacedNode> PlacedNode::items() const {
+  std::vector<PlacedNode> list;
+  for (std::size_t i = 0; node_ && i < node_->items.size(); ++i) list.push_back(PlacedNode(*this, i));
+  return list;
+}
+
+void PlacedNode::refuse_key(const std::string& message) const {
+  const Node& object = *around_->node_;
+  if (object.source == 0 && node_->source == 0)
+    findings_->add_at(object.key_offsets[index_], path(), message);
+  else
+    findings_->add_override(path(), message);
+}
+
+std::string PlacedNode::path() const {
+  if (!around_) return "";
+  const bool in_object = around_->node_->kind == Node::Kind::object;
+  return in_object ? child_path(around_->path(), key()) : child_path(around_->path(), index_);
+}
+
 }  // namespace mbsopt::inline app

@@ -48,4 +48,38 @@ class Findings {
   std::unordered_set<std::string> marked_, around_;  // paths with findings, and these with all paths they lie in
 };
 
+// A value that is being read, with its place in the file. It builds its JSON path only for a finding. It refers to the
+// value around it, which must live longer. An absent value converts to false.
+class PlacedNode {
+ public:
+  PlacedNode() = default;
+  PlacedNode(const Node& root, Findings& findings) : node_(&root), findings_(&findings) {}
+  explicit operator bool() const { return node_ != nullptr; }
+  const Node& operator*() const { return *node_; }
+  const Node* operator->() const { return node_; }
+
+  PlacedNode find(std::string_view key) const;  // of an object
+  // The values in an object or a list. An absent value has none.
+  std::vector<PlacedNode> items() const;
+  const std::string& key() const { return around_->node_->keys[index_]; }  // its key in the object around it
+  std::string path() const;
+  Findings& findings() const { return *findings_; }
+
+  // Add a finding about the value, about its key, or about byte `at` of its string.
+  void refuse(const std::string& message) const { findings_->add(*node_, path(), message); }
+  void refuse_key(const std::string& message) const;
+  void refuse_inside(std::size_t at, const std::string& message) const {
+    findings_->add_inside(*node_, at, path(), message);
+  }
+
+ private:
+  PlacedNode(const PlacedNode& around, std::size_t index)
+      : node_(&around.node_->items[index]), findings_(around.findings_), around_(&around), index_(index) {}
+
+  const Node* node_ = nullptr;
+  Findings* findings_ = nullptr;
+  const PlacedNode* around_ = nullptr;  // nullptr: it is the root
+  std::size_t index_ = 0;               // in what is around it
+};
+
 }  // namespace mbsopt::inline app

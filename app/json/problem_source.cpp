@@ -29,9 +29,8 @@ std::optional<Finding> ProblemSource::finding(const std::string& words) const {
   const std::string path = path_before(words);
   if (path.empty()) return std::nullopt;
   try {
-    const Node& node = nearest(root, path);
-    if (&node == &root) return std::nullopt;
-    return findings.finding(node, path, words.substr(path.size() + 2));
+    if (&nearest(root, path) == &root) return std::nullopt;
+    return finding(path, words.substr(path.size() + 2));
   } catch (const std::invalid_argument&) {  // no path: the words alone will do
     return std::nullopt;
   }

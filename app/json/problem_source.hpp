@@ -24,6 +24,15 @@ struct ProblemSource {
   Findings findings;  // of the text, of --set, and of read_problem()
   Node root;
 
+  // The path of a file that the problem names relative to its own folder.
+  std::filesystem::path beside(const std::string& name) const { return (file.parent_path() / name).lexically_normal(); }
+
+  // Adds a finding at the value of a path, or at the nearest value around it. finding() makes it without adding it.
+  void add(const std::string& path, const std::string& message) { findings.add(nearest(root, path), path, message); }
+  Finding finding(const std::string& path, const std::string& message) const {
+    return findings.finding(nearest(root, path), path, message);
+  }
+
   // Returns nothing if the words do not begin with a path of the problem.
   std::optional<std::string> placed(const std::string& words) const;
   std::optional<Finding> finding(const std::string& words) const;

@@ -35,18 +35,17 @@ void complete_integrator(SimulationSettings& settings, const Node& root) {
                                      .max_step = has("max_step")});
 }
 
-void resolve_data_files(Problem& problem, const std::filesystem::path& folder, const Node& root, Findings& findings) {
+void resolve_data_files(Problem& problem, ProblemSource& source) {
   if (!problem.identification) return;
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     const std::string path = child_path("identification.experiments", i) + ".data";
-    if (findings.concerns(path)) continue;
+    if (source.findings.concerns(path)) continue;
     for (std::string& data : experiments[i].data) {
-      const std::filesystem::path file = (folder / data).lexically_normal();
+      const std::filesystem::path file = source.beside(data);
       std::error_code error;
       const bool found = std::filesystem::exists(file, error) && !std::filesystem::is_directory(file, error);
-      if (!found)
-        findings.add(nearest(root, path), path, "there is no file '" + file.string() + "'; a CSV file is expected");
+      if (!found) source.add(path, "there is no file '" + file.string() + "'; a CSV file is expected");
       data = file.string();
     }
   }
@@ -55,34 +54,31 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
 // Reads each file once for all of its columns.
 class SampleReader {
  public:
-  SampleReader(std::filesystem::path folder, const Node& root, Findings& findings, std::vector<std::string>& read)
-      : folder_(std::move(folder)), root_(root), findings_(findings), read_(read) {}
+  SampleReader(ProblemSource& source, std::vector<std::string>& columns) : source_(source), columns_(columns) {}
 
   // key is that of the file. missing allows empty cells. by_row takes the number of the row in place of the time.
   void read(SampleColumn& samples, Interpolation how, const std::string& path, const char* key, bool missing = false,
             bool by_row = false) {
-    if (findings_.concerns(path)) return;
+    if (source_.findings.concerns(path)) return;
     try {
-      samples.file = (folder_ / samples.file).lexically_normal().string();
+      samples.file = source_.beside(samples.file).string();
       auto table = tables_.find(samples.file);
       if (table == tables_.end()) table = tables_.emplace(samples.file, read_csv(samples.file)).first;
-      read_curve(samples, how, missing, by_row, table->second, read_);
+      read_curve(samples, how, missing, by_row, table->second, columns_);
     } catch (const CsvError& error) {
-      findings_.add(nearest(root_, path + key), path + key, error.what());
+      source_.add(path + key, error.what());
     }
   }
 
  private:
-  std::filesystem::path folder_;
-  const Node& root_;
-  Findings& findings_;
-  std::vector<std::string>& read_;
+  ProblemSource& source_;
+  std::vector<std::string>& columns_;  // those that were read
   std::map<std::string, CsvTable> tables_;
 };
 
 // Reads all samples, so that nothing below depends on files.
-void read_samples(Problem& problem, const std::filesystem::path& folder, const Node& root, Findings& findings) {
-  SampleReader reader(folder, root, findings, problem.columns_read);
+void read_samples(Problem& problem, ProblemSource& source) {
+  SampleReader reader(source, problem.columns_read);
   Scene& scene = problem.scene;
   for (Signal& signal : scene.signals)
     reader.read(signal, signal.interpolation, child_path("signals", signal.name), ".file");
@@ -119,71 +115,61 @@ void read_samples(Problem& problem, const std::filesystem::path& folder, const N
   }
 }
 
+// Adds an error to the findings, at its part of an expression if it names one. Adds a warning to the list, if any.
+void report(const SceneIssue& issue, ProblemSource& source, std::vector<std::string>* warnings = nullptr) {
+  const Node& node = nearest(source.root, issue.path);
+  if (issue.is_warning) {
+    if (warnings) warnings->push_back(to_string(source.finding(issue.path, issue.message)));
+  } else if (issue.offset && node.kind == Node::Kind::string) {
+    source.findings.add_inside(node, *issue.offset, issue.path, issue.message);
+  } else {
+    source.findings.add(node, issue.path, issue.message);
+  }
+}
+
 // Reports data that an experiment cannot use, for every command, before anything runs.
-void check_data(Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
+void check_data(Problem& problem, ProblemSource& source, std::vector<std::string>* warnings) {
   if (!problem.identification) return;
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     const std::string place = child_path("identification.experiments", i);
-    if (findings.concerns(place)) continue;
+    if (source.findings.concerns(place)) continue;
     try {
       const CsvTable table = read_record(experiments[i], &problem.columns_read);
-      for (const SceneIssue& issue : find_data_issues(experiments[i], place, table, problem.scene)) {
-        const Node& node = nearest(root, issue.path);
-        if (!issue.is_warning)
-          findings.add(node, issue.path, issue.message);
-        else if (warnings)
-          warnings->push_back(to_string(findings.finding(node, issue.path, issue.message)));
-      }
+      for (const SceneIssue& issue : find_data_issues(experiments[i], place, table, problem.scene))
+        report(issue, source, warnings);
     } catch (const CsvError& error) {
-      findings.add(nearest(root, place + ".data"), place + ".data", error.what());
+      source.add(place + ".data", error.what());
     }
   }
-}
-
-void add_issue(const SceneIssue& issue, const Node& root, Findings& findings) {
-  const Node& node = nearest(root, issue.path);
-  if (issue.offset && node.kind == Node::Kind::string)
-    findings.add_inside(node, *issue.offset, issue.path, issue.message);
-  else
-    findings.add(node, issue.path, issue.message);
 }
 
 // Reports errors of meaning at their place in the file. It omits an error that follows from one in the reading. It
 // names the bounded means once they are known to be right.
-void add_issues(Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
-  std::vector<SceneIssue> errors;
-  for (SceneIssue& issue : find_issues(problem)) {
-    if (issue.is_warning) {
-      if (warnings)
-        warnings->push_back(to_string(findings.finding(nearest(root, issue.path), issue.path, issue.message)));
-    } else if (!findings.concerns(issue.path)) {
-      errors.push_back(std::move(issue));
-    }
-  }
-  for (const SceneIssue& issue : errors) add_issue(issue, root, findings);
-  check_data(problem, root, findings, warnings);
+void report_issues(Problem& problem, ProblemSource& source, std::vector<std::string>* warnings) {
+  const Findings& findings = source.findings;
+  std::vector<SceneIssue> issues = find_issues(problem);
+  std::erase_if(issues, [&](const SceneIssue& issue) { return !issue.is_warning && findings.concerns(issue.path); });
+  for (const SceneIssue& issue : issues) report(issue, source, warnings);
+  check_data(problem, source, warnings);
   if (findings.any()) return;
   name_bounded_means(problem);
-  for (const SceneIssue& issue : find_unused_parameters(problem)) add_issue(issue, root, findings);
+  for (const SceneIssue& issue : find_unused_parameters(problem)) report(issue, source);
   for (const SceneIssue& issue : find_idle_variables(problem))
-    if (!findings.concerns(issue.path)) add_issue(issue, root, findings);
+    if (!findings.concerns(issue.path)) report(issue, source);
 }
 
 }  // namespace
 
 Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings, const ReadOptions& options) {
-  Findings& findings = source.findings;
-  const Node& root = source.root;
-  const std::filesystem::path folder = source.file.parent_path();
   Problem problem;
-  FieldReader::read(root, "", findings, problem);
-  complete_integrator(problem.scene.simulation, root);
-  resolve_terms(problem, options, folder, root, findings);
-  resolve_data_files(problem, folder, root, findings);
-  read_samples(problem, folder, root, findings);
-  add_issues(problem, root, findings, warnings);
-  findings.throw_if_any();
+  read_fields({source.root, source.findings}, problem);
+  complete_integrator(problem.scene.simulation, source.root);
+  resolve_terms(problem, options, source);
+  resolve_data_files(problem, source);
+  read_samples(problem, source);
+  report_issues(problem, source, warnings);
+  source.findings.throw_if_any();
   allow_what_only_measurements_use(problem);
   return problem;
 }

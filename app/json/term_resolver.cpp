@@ -17,20 +17,19 @@ namespace {
 
 class TermResolver {
  public:
-  TermResolver(NamedTerms terms, const Node& root, Findings& findings)
-      : terms_(std::move(terms)), root_(root), findings_(findings) {}
+  TermResolver(NamedTerms terms, ProblemSource& source) : terms_(std::move(terms)), source_(source) {}
 
-  void load(std::vector<std::string>& plugins, bool allowed, const std::filesystem::path& folder) {
-    if (!plugins.empty() && !allowed && !findings_.concerns("plugins"))
-      add("plugins",
-          "names code that would run inside this program; if you trust the file, allow it by --allow-plugins");
+  void load(std::vector<std::string>& plugins, bool allowed) {
+    if (!plugins.empty() && !allowed && !source_.findings.concerns("plugins"))
+      source_.add("plugins",
+                  "names code that would run inside this program; if you trust the file, allow it by --allow-plugins");
     for (std::size_t i = 0; i < plugins.size(); ++i) {
-      plugins[i] = (folder / plugins[i]).lexically_normal().string();
+      plugins[i] = source_.beside(plugins[i]).string();
       if (!allowed) continue;
       try {
         load_plugin(plugins[i], terms_);
       } catch (const std::runtime_error& error) {
-        add(child_path("plugins", i), error.what());
+        source_.add(child_path("plugins", i), error.what());
       }
     }
   }
@@ -45,8 +44,8 @@ class TermResolver {
     const std::size_t acts_on =
         named_throw("force '" + user->force + "'", [&] { return term->force->bodies(); }).size();
     if (!user->bodies.empty() && user->bodies.size() != acts_on)
-      add(place + ".bodies", "has " + counted(user->bodies.size(), "name") + ", but '" + user->force + "' acts on " +
-                                 counted(acts_on, "body", "bodies"));
+      source_.add(place + ".bodies", "has " + counted(user->bodies.size(), "name") + ", but '" + user->force +
+                                         "' acts on " + counted(acts_on, "body", "bodies"));
   }
 
   void resolve(UserCostSpec& cost, const std::string& place) {
@@ -69,19 +68,18 @@ class TermResolver {
   }
 
  private:
-  void add(const std::string& path, const std::string& message) { findings_.add(nearest(root_, path), path, message); }
-
   // The finding about a plug-in that is not loaded replaces those about its unknown names.
   template <class Term>
   const Term* find(const std::vector<Term>& all, const std::string& what, const std::string& name,
                    const std::string& path) {
     const auto found = std::ranges::find(all, name, &Term::name);
     if (found != all.end()) return &*found;
-    if (findings_.concerns("plugins") || findings_.concerns(path)) return nullptr;
+    if (source_.findings.concerns("plugins") || source_.findings.concerns(path)) return nullptr;
     std::vector<std::string> known;
     for (const Term& term : all) known.push_back(term.name);
-    add(path, "there is no " + what + " '" + name + "' written in C++" + did_you_mean(name, known) +
-                  (known.empty() ? "; neither the program nor its plug-ins have one" : "; known: " + joined(known)));
+    source_.add(path,
+                "there is no " + what + " '" + name + "' written in C++" + did_you_mean(name, known) +
+                    (known.empty() ? "; neither the program nor its plug-ins have one" : "; known: " + joined(known)));
     return nullptr;
   }
 
@@ -93,27 +91,25 @@ class TermResolver {
       if (found != given.end())
         ordered.push_back(*found);
       else
-        add(place + ".parameters", "'" + name + "' is missing; expected: " + joined(wanted));
+        source_.add(place + ".parameters", "'" + name + "' is missing; expected: " + joined(wanted));
     }
     for (const TermParameter& parameter : given)
       if (std::ranges::find(wanted, parameter.name) == wanted.end())
-        add(child_path(place + ".parameters", parameter.name),
-            "is no parameter of the term" + did_you_mean(parameter.name, wanted) +
-                (wanted.empty() ? "; it has none" : "; known: " + joined(wanted)));
+        source_.add(child_path(place + ".parameters", parameter.name),
+                    "is no parameter of the term" + did_you_mean(parameter.name, wanted) +
+                        (wanted.empty() ? "; it has none" : "; known: " + joined(wanted)));
     given = std::move(ordered);
   }
 
   NamedTerms terms_;
-  const Node& root_;
-  Findings& findings_;
+  ProblemSource& source_;
 };
 
 }  // namespace
 
-void resolve_terms(Problem& problem, const ReadOptions& options, const std::filesystem::path& folder, const Node& root,
-                   Findings& findings) {
-  TermResolver resolver(options.terms, root, findings);
-  resolver.load(problem.plugins, options.allow_plugins, folder);
+void resolve_terms(Problem& problem, const ReadOptions& options, ProblemSource& source) {
+  TermResolver resolver(options.terms, source);
+  resolver.load(problem.plugins, options.allow_plugins);
   const auto laws = [&](std::vector<DriveLaw>& all, const std::string& owner) {
     for (std::size_t i = 0; i < all.size(); ++i)
       resolver.resolve(all[i].law, all[i].samples, child_path(owner + ".drives", i) + ".law");
