@@ -23,11 +23,14 @@ struct JsonFault {
 // Objects, lists and comments, by recursive descent. Throws a JsonFault where the text is no JSON.
 class JsonParser {
  public:
-  // findings receives keys that are in an object twice. The later ones are left out.
-  JsonParser(std::string_view text, Findings* findings)
-      : text_(text), findings_(findings), at_(text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0) {}
+  // Nodes get this source. findings receives keys that are in an object twice. The later ones are left out.
+  JsonParser(std::string_view text, int source, Findings* findings)
+      : text_(text), source_(source), findings_(findings) {}
 
   Node document() {
+    if (text_.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
+    if (text_.find_first_not_of(kBlanks, at_) == std::string_view::npos)
+      throw JsonFault{0, "is empty, an object { ... } is expected"};
     Node node = value();
     if (next() != '\0') expected("the end");
     return node;
@@ -72,6 +75,7 @@ class JsonParser {
   Node value() {
     const char first = next();
     Node node;
+    node.source = source_;
     node.begin = at_;
     if (first == '{' || first == '[') {
       if (open_.size() == kDeepestNesting)
@@ -159,36 +163,22 @@ class JsonParser {
   }
 
   std::string_view text_;
+  int source_;
   Findings* findings_;
-  std::size_t at_;
+  std::size_t at_ = 0;
   std::vector<const Node*> open_;  // objects and lists around the place
 };
-
-void set_source(Node& node, int source) {
-  node.source = source;
-  for (Node& item : node.items) set_source(item, source);
-}
 
 }  // namespace
 
 Node parse_json(Findings& findings) {
   const std::string& text = findings.text().content();
-  if (const std::size_t invalid = findings.text().first_invalid_byte(); invalid != std::string::npos) {
-    findings.add_at(invalid, "",
-                    fmt::format("is not UTF-8 text: byte 0x{:02X}", static_cast<unsigned char>(text[invalid])));
-    findings.throw_if_any();
-  }
-  if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
-    findings.add_at(nul, "", "is not JSON: byte 0x00");
-    findings.throw_if_any();
-  }
-  if (text.find_first_not_of(kBlanks, text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0) ==
-      std::string::npos) {
-    findings.add_at(0, "", "is empty, an object { ... } is expected");
-    findings.throw_if_any();
-  }
   try {
-    return JsonParser(text, &findings).document();
+    if (const std::size_t bad = findings.text().first_invalid_byte(); bad != std::string::npos)
+      throw JsonFault{bad, fmt::format("is not UTF-8 text: byte 0x{:02X}", static_cast<unsigned char>(text[bad]))};
+    if (const std::size_t nul = text.find('\0'); nul != std::string::npos)
+      throw JsonFault{nul, "is not JSON: byte 0x00"};
+    return JsonParser(text, 0, &findings).document();
   } catch (const JsonFault& fault) {
     findings.add_at(fault.at, "", fault.message);
     findings.throw_if_any();
@@ -197,15 +187,15 @@ Node parse_json(Findings& findings) {
 }
 
 Node parse_override_value(const std::string& text, int source) {
-  Node node;
   try {
-    node = JsonParser(text, nullptr).document();
+    return JsonParser(text, source, nullptr).document();
   } catch (const JsonFault&) {
+    Node node;
     node.kind = Node::Kind::string;
     node.string = text;
+    node.source = source;
+    return node;
   }
-  set_source(node, source);
-  return node;
 }
 
 }  // namespace mbsopt::inline app
