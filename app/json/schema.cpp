@@ -25,6 +25,16 @@ Json default_of(const VectorField& field) {
   return Json::array({default_of(field[0]), default_of(field[1]), default_of(field[2])});
 }
 
+Json default_of(const PointField& field) {
+  const std::string* const name = std::get_if<std::string>(&field);
+  return name ? Json(*name) : Json();
+}
+Json default_of(const auto& number) { return number; }
+template <class T>
+Json default_of(const std::optional<T>&) {
+  return {};
+}
+
 template <class T>
 Json object_schema();
 template <class T>
@@ -37,7 +47,6 @@ class SchemaWriter {
   Json required = Json::array();
   Json dependent = Json::object();  // requirements that a key makes on others
   std::span<const TypeRow> rows;    // of an object with a type
-  std::string type_key;
 
   Json object() const {
     Json schema{{"type", "object"}, {"properties", properties}};
@@ -81,25 +90,19 @@ class SchemaWriter {
   const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> all,
                       const FieldInfo& info) {
     rows = all;
-    type_key = key;
     const TypeRow* const row = find_row(all, current);
     if (row) put(key, {row->description, info.need, {}}, {{"const", row->name}});
     return row;
   }
 
-  void number(std::string_view key, Field& value, const FieldInfo& info) {
+  void number(std::string_view key, auto& value, const FieldInfo& info) {
     put(key, info, ref("expression"), default_of(value));
   }
-  void number(std::string_view key, std::optional<Field>&, const FieldInfo& info) { put(key, info, ref("expression")); }
   void vector(std::string_view key, VectorField& value, const FieldInfo& info) {
     put(key, info, ref("vector"), default_of(value));
   }
-  void point(std::string_view key, PointField& value, std::string_view, const FieldInfo& info) {
-    const std::string* const initial = std::get_if<std::string>(&value);
-    put(key, info, ref("point"), initial ? Json(*initial) : Json());
-  }
-  void point(std::string_view key, std::optional<PointField>&, std::string_view, const FieldInfo& info) {
-    put(key, info, ref("point"));
+  void point(std::string_view key, auto& value, std::string_view, const FieldInfo& info) {
+    put(key, info, ref("point"), default_of(value));
   }
   void inertia(std::string_view key, InertiaField&, std::optional<ConsistentInertiaField>&, const FieldInfo& info) {
     SchemaWriter form;
@@ -116,13 +119,10 @@ class SchemaWriter {
   void points(std::string_view key, std::map<std::string, VectorField>&, const FieldInfo& info) {
     put(key, info, {{"type", "object"}, {"propertyNames", names_pattern()}, {"additionalProperties", ref("vector")}});
   }
-  void law(std::string_view key, std::optional<Expression>&, Scope, const FieldInfo& info) {
-    put(key, info, ref("expression"));
+  void law(std::string_view key, std::optional<Expression>& value, Scope, const FieldInfo& info) {
+    number(key, value, info);
   }
-  void expression(std::string_view key, Expression& value, Scope, const FieldInfo& info) {
-    put(key, info, ref("expression"), info.need == Need::required ? Json() : default_of(value));
-  }
-
+  void expression(std::string_view key, Expression& value, Scope, const FieldInfo& info) { number(key, value, info); }
   void time_law(std::string_view key, Expression&, std::optional<SampledLaw>&, const FieldInfo& info) {
     SampledLaw called;
     called.function = "f";
@@ -136,23 +136,12 @@ class SchemaWriter {
   }
   void laws(std::string_view key, LawVector& value, Scope, const FieldInfo& info) { vector(key, value, info); }
 
-  void plain(std::string_view key, double& value, const Range& range, const FieldInfo& info) {
-    put(key, info, ranged(ref("number"), range), value);
-  }
-  void plain(std::string_view key, std::optional<double>&, const Range& range, const FieldInfo& info) {
-    put(key, info, ranged(ref("number"), range));
-  }
-  void plain(std::string_view key, std::optional<long>&, const Range& range, const FieldInfo& info) {
-    put(key, info, ranged({{"type", "integer"}}, range));
-  }
-  void plain(std::string_view key, int& value, const Range& range, const FieldInfo& info) {
-    put(key, info, ranged({{"type", "integer"}}, range), value);
-  }
-  void plain(std::string_view key, long& value, const Range& range, const FieldInfo& info) {
-    put(key, info, ranged({{"type", "integer"}}, range), value);
-  }
-  void plain(std::string_view key, bool& value, const Range&, const FieldInfo& info) {
-    put(key, info, {{"type", "boolean"}}, value);
+  template <class T>
+  void plain(std::string_view key, T& value, const Range& range, const FieldInfo& info) {
+    if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>>)
+      put(key, info, ranged(ref("number"), range), default_of(value));
+    else
+      put(key, info, ranged({{"type", std::is_same_v<T, bool> ? "boolean" : "integer"}}, range), default_of(value));
   }
   template <std::size_t N>
   void level(std::string_view key, std::optional<double>&, const Choice<double> (&choices)[N], const Range& range,
