@@ -27,9 +27,8 @@ struct OthersWithout {
   double before = 0, after = 0;
 };
 
-// Per group of members, which follow each other. Stacks must have no equalities, and shared variables.
+// Per group of members; the groups are 0, 1, ... Stacks must have no equalities, and shared variables.
 std::vector<OthersWithout> others_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
-                                          const std::vector<UnknownParameter>& unknowns,
                                           const std::vector<std::size_t>& group_of_member);
 
 }  // namespace mbsopt::inline optim

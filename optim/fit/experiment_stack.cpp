@@ -39,15 +39,18 @@ VectorXd per_sample(const std::vector<ExperimentStack::Member>& members, F&& f) 
 
 }  // namespace
 
-ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<UnknownParameter>& unknowns,
-                                 const VariableScaling& scaling, const Loss& fit_loss)
-    : LeastSquaresProblem(scaling.size(), samples_of(members) + priors_of(unknowns)),
+ExperimentStack::ExperimentStack(std::vector<Member> members, std::vector<UnknownParameter> unknowns,
+                                 const Loss& fit_loss, std::function<bool(double t)> go_on, int threads)
+    : LeastSquaresProblem(std::ssize(unknowns), samples_of(members) + priors_of(unknowns)),
       members_(std::move(members)),
-      scaling_(scaling) {
-  x_lower = scaling.x_lower(), x_upper = scaling.x_upper();
+      unknowns_(std::move(unknowns)),
+      scaling_(scaling_of(unknowns_)),
+      go_on_(std::move(go_on)),
+      threads_(threads) {
+  x_lower = scaling_.x_lower(), x_upper = scaling_.x_upper();
   loss = fit_loss;
-  for (std::size_t i = 0; i < unknowns.size(); ++i)
-    if (const auto& prior = unknowns[i].description.prior)
+  for (std::size_t i = 0; i < unknowns_.size(); ++i)
+    if (const auto& prior = unknowns_[i].description.prior)
       priors_.push_back({static_cast<Index>(i), prior->mean, prior->sigma});
   plain = static_cast<Index>(priors_.size());
   Index row = 0;
@@ -58,7 +61,7 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<
     row += static_cast<Index>(part.rows.size());
     for (const Experiment::Unknown& unknown : m.model.unknowns()) part.variables.push_back(unknown.at);
   }
-  tie(unknowns);
+  tie();
   for (const Prior& prior : priors_) {  // beside the samples that depend on its variable
     const auto depends = [&](const Dependence& part) {
       return std::ranges::find(part.variables, prior.at) != part.variables.end();
@@ -72,12 +75,12 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<
 }
 
 // The equations stand beside the samples of the member that ends there.
-void ExperimentStack::tie(const std::vector<UnknownParameter>& unknowns) {
+void ExperimentStack::tie() {
   // The largest start value of a parameter in any member.
   const auto size_of = [&](const Experiment::Unknown& given) {
-    const std::string& name = unknowns[static_cast<std::size_t>(given.at)].description.name;
+    const std::string& name = unknowns_[static_cast<std::size_t>(given.at)].description.name;
     double largest = 0;
-    for (const UnknownParameter& u : unknowns)
+    for (const UnknownParameter& u : unknowns_)
       if (u.description.name == name) largest = std::max(largest, std::abs(u.description.value));
     return largest;
   };
@@ -88,7 +91,7 @@ void ExperimentStack::tie(const std::vector<UnknownParameter>& unknowns) {
     Experiment& next = members_[i + 1].model;
     std::vector<Experiment::Unknown> own;
     for (const Experiment::Unknown& unknown : next.unknowns())
-      if (!unknowns[static_cast<std::size_t>(unknown.at)].shared) own.push_back(unknown);
+      if (!unknowns_[static_cast<std::size_t>(unknown.at)].shared) own.push_back(unknown);
     const StateChart chart = next.chart_of_start(own);
     members_[i].model.read_end(chart), next.read_start(chart);
     std::vector<Index>& variables = parts[i].variables;
@@ -146,33 +149,33 @@ std::vector<Experiment::Residuals> ExperimentStack::residuals(const VectorXd& u)
     if (!records || !records->recall(asked[i], found[i])) simulated.push_back(i);
   }
   simulations_ += static_cast<long>(simulated.size());
-  on_threads(simulated.size(), threads, [&](std::size_t job) {
+  on_threads(simulated.size(), threads_, [&](std::size_t job) {
     const Member& m = members_[simulated[job]];
-    Experiment::Limits limits{go_on, {}};
+    Experiment::Limits limits{go_on_, {}};
     if (m.most_steps > 0) limits.max_steps = kStepGrowth * m.most_steps;
     found[simulated[job]] = m.model.residuals(u, limits);
   });
+  for (std::size_t i = 0; i < members_.size(); ++i)
+    if (found[i].ok) members_[i].most_steps = std::max(members_[i].most_steps, found[i].steps);
   if (records)
     for (const std::size_t i : simulated)
       if (found[i].ok) records->record(asked[i], found[i]);
   return found;
 }
 
-void ExperimentStack::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
+Eigen::MatrixXd ExperimentStack::z_rho(const LeastSquaresPoint& point, const VectorXd& x) const {
+  return point.z_x * scaling_.rho_x(x).cwiseInverse().asDiagonal();
+}
+
+LeastSquaresPoint ExperimentStack::collected(const std::vector<Experiment::Residuals>& found, const VectorXd& x) const {
+  LeastSquaresPoint point{true, {}, VectorXd::Zero(size), Eigen::MatrixXd::Zero(size, variables())};
   const VectorXd u = scaling_.to_rho(x), u_x = scaling_.rho_x(x);
-  const std::vector<Experiment::Residuals> found = residuals(u);
   Index row = 0;
   for (std::size_t i = 0; i < members_.size(); ++i) {
-    Member& m = members_[i];
-    const Experiment::Residuals& r = found[i];
-    if (!r.ok) {
-      point.ok = false, point.message = r.message;
-      return;
-    }
-    m.most_steps = std::max(m.most_steps, r.steps);
-    const Index n = r.z.size();
-    point.z.segment(row, n) = r.z;
-    point.z_x.middleRows(row, n) = r.z_u * u_x.asDiagonal();
+    const Index n = found[i].z.size();
+    if (!found[i].ok) return {false, found[i].message, std::move(point.z), std::move(point.z_x)};
+    point.z.segment(row, n) = found[i].z;
+    point.z_x.middleRows(row, n) = found[i].z_u * u_x.asDiagonal();
     row += n;
   }
   for (const Prior& p : priors_) {
@@ -187,6 +190,7 @@ void ExperimentStack::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
     point.z_x.middleRows(row, n) = (found[i].end_u - found[i + 1].start_u) * u_x.asDiagonal();
     row += n;
   }
+  return point;
 }
 
 }  // namespace mbsopt::inline optim

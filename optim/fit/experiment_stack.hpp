@@ -7,8 +7,8 @@
 // The loss does not see priors. A value free in several experiments has its prior in each. s is the chart of the later
 // experiment's start (state_chart.hpp).
 //
-//   ExperimentStack stack(std::move(experiments), unknowns, scaling, spec.loss);
-//   LeastSquaresResult fit = solve_least_squares(stack, scaling.to_x(start_of(unknowns)));
+//   ExperimentStack stack(std::move(experiments), unknowns, spec.loss);
+//   LeastSquaresResult fit = solve_least_squares(stack, stack.start());
 #pragma once
 
 #include <functional>
@@ -42,14 +42,22 @@ class ExperimentStack : public LeastSquaresProblem {
     long most_steps = 0;     // of a simulation that went well
   };
 
-  // scaling must outlive it.
-  ExperimentStack(std::vector<Member> members, const std::vector<UnknownParameter>& unknowns,
-                  const VariableScaling& scaling, const Loss& fit_loss);
+  // go_on: within a simulation, in any thread; false abandons it. threads: experiments at a time.
+  ExperimentStack(std::vector<Member> members, std::vector<UnknownParameter> unknowns, const Loss& fit_loss,
+                  std::function<bool(double t)> go_on = {}, int threads = 1);
 
-  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override { point = at(x); }
+  LeastSquaresPoint at(const Eigen::VectorXd& x) { return collected(residuals(scaling_.to_rho(x)), x); }
+  std::vector<Experiment::Residuals> residuals(const Eigen::VectorXd& u);  // per member
+  LeastSquaresPoint collected(const std::vector<Experiment::Residuals>& found, const Eigen::VectorXd& x) const;
+
+  Eigen::VectorXd start() const { return scaling_.to_x(start_of(unknowns_)); }
+  Eigen::MatrixXd z_rho(const LeastSquaresPoint& point, const Eigen::VectorXd& x) const;  // of all rows, at x
+  bool is_at_bound(const Eigen::VectorXd& x, Eigen::Index k) const { return x(k) <= x_lower(k) || x(k) >= x_upper(k); }
 
   std::vector<Member>& members() { return members_; }
   const std::vector<Member>& members() const { return members_; }
+  const std::vector<UnknownParameter>& unknowns() const { return unknowns_; }
   const VariableScaling& scaling() const { return scaling_; }
   Eigen::Index samples() const { return size - plain - equalities; }
   Eigen::Index freedom_of_variables() const { return variables() - equalities; }
@@ -57,21 +65,21 @@ class ExperimentStack : public LeastSquaresProblem {
   std::vector<SampledRecord> records_in_time() const;  // one per member, or per chain of those that continue
   std::vector<SampledRecord> motions_in_time() const;  // one per member, with all that follow
   long simulations() const { return simulations_; }
-  int threads = 1;                      // experiments at a time
-  std::function<bool(double t)> go_on;  // within a simulation, in any thread; false abandons it
   ResidualRecords* records = nullptr;
 
  private:
   std::vector<SampledRecord> in_time(const std::function<bool(std::size_t member)>& joins_last) const;
-  void tie(const std::vector<UnknownParameter>& unknowns);
+  void tie();
   struct Prior {
     Eigen::Index at;
     double mean, sigma;
   };
-  std::vector<Experiment::Residuals> residuals(const Eigen::VectorXd& u);  // per member
 
   std::vector<Member> members_;
-  const VariableScaling& scaling_;
+  std::vector<UnknownParameter> unknowns_;
+  VariableScaling scaling_;
+  std::function<bool(double t)> go_on_;
+  int threads_;
   std::vector<Prior> priors_;
   long simulations_ = 0;
 };

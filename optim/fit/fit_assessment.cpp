@@ -85,7 +85,7 @@ void score_experiment(FitContext& fit, const ExperimentStack::Member& member, co
   scored.rms = std::sqrt(squares / static_cast<double>(scored.samples));
 }
 
-void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated) {
+void score_all(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated) {
   Eigen::Index row = 0;
   for (const ExperimentStack::Member& m : stack.members()) {
     const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
@@ -94,23 +94,21 @@ void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z
   }
 }
 
-FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& solution, const ExperimentStack& stack,
-                            const std::vector<UnknownParameter>& unknowns) {
-  const Eigen::VectorXd u_x = stack.scaling().rho_x(solution.x);
-  const Eigen::MatrixXd J = z_in_parameters(stack, solution.point, solution.x);
+FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& solution, const ExperimentStack& stack) {
+  const Eigen::MatrixXd J = stack.z_rho(solution.point, solution.x);
   FitData data;
   data.J = J.topRows(stack.samples()), data.J_prior = J.middleRows(stack.samples(), stack.plain);
   data.C = J.bottomRows(stack.equalities);
   data.z = solution.point.z.head(stack.samples());
   data.rho = stack.scaling().to_rho(solution.x);
-  data.names = names_of(unknowns, fit.spec);
-  for (const UnknownParameter& u : unknowns) data.units.push_back(u.description.unit);
+  data.names = names_of(stack.unknowns(), fit.spec);
   data.loss = fit.spec.loss, data.sigma_is_known = fit.spec.sigma_is_known;
-  data.change = u_x.cwiseAbs();
+  data.change = stack.scaling().rho_x(solution.x).cwiseAbs();
   data.covariance = covariance_for(fit, stack);
-  for (const UnknownParameter& u : unknowns) data.of_one_record.push_back(!u.shared);
-  for (Eigen::Index k = 0; k < solution.x.size(); ++k)
-    data.at_bound.push_back(solution.x(k) <= stack.x_lower(k) || solution.x(k) >= stack.x_upper(k));
+  for (const UnknownParameter& u : stack.unknowns()) {
+    data.at_bound.push_back(stack.is_at_bound(solution.x, std::ssize(data.at_bound)));
+    data.units.push_back(u.description.unit), data.of_one_record.push_back(!u.shared);
+  }
   data.records = stack.records_in_time(), data.motions = stack.motions_in_time();
   data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
   const IntegratorSettings& integrator = fit.scene.simulation.integrator;
@@ -124,13 +122,13 @@ FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& sol
   return statistics;
 }
 
-std::vector<FittedParameter> described(const FitContext& fit, const std::vector<UnknownParameter>& unknowns,
-                                       const Eigen::VectorXd& values, const FitStatistics& statistics) {
+std::vector<FittedParameter> described(const FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& x,
+                                       const FitStatistics& statistics) {
+  const Eigen::VectorXd values = stack.scaling().to_rho(x);
   std::vector<FittedParameter> fitted;
-  for (std::size_t i = 0; i < unknowns.size(); ++i) {
-    const UnknownParameter& u = unknowns[i];
+  for (const UnknownParameter& u : stack.unknowns()) {
     const Parameter& p = u.description;
-    const Eigen::Index k = static_cast<Eigen::Index>(i);
+    const Eigen::Index k = std::ssize(fitted);
     FittedParameter f;
     f.name = name_of(u, fit.spec), f.parameter = p.name, f.unit = p.unit;
     if (!u.shared) f.experiment = fit.spec.experiments[u.experiment].name;
@@ -148,11 +146,6 @@ std::vector<FittedParameter> described(const FitContext& fit, const std::vector<
   return fitted;
 }
 
-Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquaresPoint& point,
-                                const Eigen::VectorXd& x) {
-  return point.z_x * stack.scaling().rho_x(x).cwiseInverse().asDiagonal();
-}
-
 void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance,
              std::size_t first) {
   const FitStatistics& s = fit.result.statistics;
@@ -168,20 +161,19 @@ void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixX
   }
 }
 
-void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastSquaresResult& solution,
-                     const std::vector<UnknownParameter>& unknowns) {
+void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastSquaresResult& solution) {
   const FitStatistics& s = fit.result.statistics;
   const bool determined = s.none.empty() && s.unidentifiable.empty();
-  const bool shares = std::ranges::any_of(unknowns, &UnknownParameter::shared);
+  const bool shares = std::ranges::any_of(stack.unknowns(), &UnknownParameter::shared);
   if (stack.members().size() < 2 || stack.equalities > 0 || !determined || !shares || fit.options.preflight) return;
-  const Eigen::VectorXd errors = fit.result.statistics.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
+  const Eigen::VectorXd errors = s.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
   std::vector<std::size_t> each(stack.members().size());
   std::iota(each.begin(), each.end(), std::size_t{0});
-  const std::vector<OthersWithout> others = others_without(stack, solution, unknowns, each);
+  const std::vector<OthersWithout> others = others_without(stack, solution, each);
   for (std::size_t m = 0; m < others.size(); ++m) {
     std::optional<Influence>& most = fit.result.experiments[stack.members()[m].experiment].influence;
     for (Eigen::Index k = 0; k < errors.size(); ++k) {
-      const UnknownParameter& unknown = unknowns[static_cast<std::size_t>(k)];
+      const UnknownParameter& unknown = stack.unknowns()[static_cast<std::size_t>(k)];
       const double change = others[m].change(k) / errors(k);
       if (unknown.shared && std::isfinite(errors(k)) && (!most || std::abs(change) > std::abs(most->change)))
         most = {unknown.description.name, change};

@@ -7,7 +7,6 @@
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/fit_context.hpp"
 #include "optim/fit/statistics.hpp"
-#include "optim/fit/unknown_parameters.hpp"
 #include "optim/solver/levenberg_marquardt.hpp"
 
 namespace mbsopt::inline optim {
@@ -18,18 +17,15 @@ void name_experiments(FitContext& fit);
 // estimated: whether the fit has estimated sigmas.
 void score_experiment(FitContext& fit, const ExperimentStack::Member& member, const Eigen::VectorXd& z, bool estimated);
 // The same of all experiments of the stack.
-void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated);
+void score_all(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated);
 
 // Statistics of the parameters by the samples and the priors at a solution. The experiments of the stack must be
 // scored.
-FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& solution, const ExperimentStack& stack,
-                            const std::vector<UnknownParameter>& unknowns);
+FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& solution, const ExperimentStack& stack);
 
-std::vector<FittedParameter> described(const FitContext& fit, const std::vector<UnknownParameter>& unknowns,
-                                       const Eigen::VectorXd& values, const FitStatistics& statistics);
-
-// dz/drho of all rows, at x.
-Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquaresPoint& point, const Eigen::VectorXd& x);
+// The unknowns of the stack at x.
+std::vector<FittedParameter> described(const FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& x,
+                                       const FitStatistics& statistics);
 
 // Sets the half-widths of the 95 % intervals for one more measurement: Seber and Wild, "Nonlinear Regression" (1989),
 // section 5.1.1. The rows of residuals of these samples begin at `first`:
@@ -37,8 +33,7 @@ Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquares
 void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance,
              std::size_t first);
 
-void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastSquaresResult& solution,
-                     const std::vector<UnknownParameter>& unknowns);
+void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastSquaresResult& solution);
 
 // sigmas: how many were estimated.
 void compare_by_likelihood(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& z, std::size_t sigmas);

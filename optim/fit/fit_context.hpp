@@ -28,11 +28,10 @@ struct FitContext {
 
 LeastSquaresOptions solver_options(const FitContext& fit);
 
-ExperimentStack::Member member(const FitContext& fit, std::size_t experiment, const Eigen::VectorXd& rho,
-                               const std::vector<UnknownParameter>& unknowns);
-
-// All that are fitted.
-std::vector<ExperimentStack::Member> fitted_members(const FitContext& fit,
-                                                    const std::vector<UnknownParameter>& unknowns);
+// Experiments with these unknowns; rho: the values of all other parameters.
+ExperimentStack stack_of(const FitContext& fit, const std::vector<std::size_t>& experiments, const Eigen::VectorXd& rho,
+                         std::vector<UnknownParameter> unknowns);
+// All that are fitted, as given.
+ExperimentStack fitted_stack(const FitContext& fit);
 
 }  // namespace mbsopt::inline optim

@@ -36,12 +36,11 @@ class Doubts {
   Doubts(const FitContext& fit, const std::vector<ChannelRecord>& records, const ExperimentStack& stack)
       : fit_(fit), stack_(stack), records_(records) {}
 
-  std::vector<std::string> all(const LeastSquaresResult& solution, const std::vector<UnknownParameter>& unknowns) {
+  std::vector<std::string> all(const LeastSquaresResult& solution) {
     for (const ChannelRecord& s : records_) say_taken_out(s), doubt_explanation(s), doubt_given_sigma(s);
     for (const ChannelRecord& s : records_) compare_elsewhere(s);
     // A record that estimated sigmas have given up tells nothing of the others.
-    if (std::ranges::all_of(reasons_, [](const auto& of) { return of.second.empty(); }))
-      leave_out_each(solution, unknowns);
+    if (std::ranges::all_of(reasons_, [](const auto& of) { return of.second.empty(); })) leave_out_each(solution);
     for (const auto& [record, why] : reasons_)
       if (!why.empty())
         add("experiment '{}' disagrees with the others{}. Look at its columns, units, signs and clock, or free the "
@@ -119,8 +118,8 @@ class Doubts {
                          most);
   }
 
-  void leave_out_each(const LeastSquaresResult& solution, const std::vector<UnknownParameter>& unknowns) {
-    const bool shares = std::ranges::any_of(unknowns, &UnknownParameter::shared);
+  void leave_out_each(const LeastSquaresResult& solution) {
+    const bool shares = std::ranges::any_of(stack_.unknowns(), &UnknownParameter::shared);
     if (reasons_.size() < 2 || stack_.equalities > 0 || !shares ||
         std::ranges::none_of(records_, &ChannelRecord::is_resolved))
       return;
@@ -129,9 +128,9 @@ class Doubts {
     for (const ExperimentStack::Member& m : stack_.members()) {
       const std::string& name = record_name(fit_.spec.experiments[m.experiment]);
       if (names.empty() || names.back() != name) names.push_back(name);
-      group_of_member.push_back(names.size());
+      group_of_member.push_back(names.size() - 1);
     }
-    const std::vector<OthersWithout> others = others_without(stack_, solution, unknowns, group_of_member);
+    const std::vector<OthersWithout> others = others_without(stack_, solution, group_of_member);
     for (std::size_t g = 0; g < names.size(); ++g) {
       const auto& [change, samples, before, after] = others[g];
       const double n = static_cast<double>(samples), freedom = n - static_cast<double>(stack_.variables());
@@ -209,9 +208,8 @@ std::vector<ChannelRecord> channel_records(const FitContext& fit, const Experime
 }
 
 std::vector<std::string> doubts_of_fit(const FitContext& fit, const std::vector<ChannelRecord>& records,
-                                       const ExperimentStack& stack, const LeastSquaresResult& solution,
-                                       const std::vector<UnknownParameter>& unknowns) {
-  return Doubts(fit, records, stack).all(solution, unknowns);
+                                       const ExperimentStack& stack, const LeastSquaresResult& solution) {
+  return Doubts(fit, records, stack).all(solution);
 }
 
 std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const std::vector<ChannelRecord>& records,

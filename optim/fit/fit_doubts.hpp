@@ -2,7 +2,7 @@
 // experiment are one record.
 //
 //   const std::vector<ChannelRecord> records = channel_records(fit, stack);
-//   for (std::string& words : doubts_of_fit(fit, records, stack, solution, unknowns)) ...
+//   for (std::string& words : doubts_of_fit(fit, records, stack, solution)) ...
 //   for (const AngleDoubt& doubt : angle_doubts(fit, records, stack, z_start)) ...   // to be tested by another fit
 #pragma once
 
@@ -34,8 +34,7 @@ std::vector<ChannelRecord> channel_records(const FitContext& fit, const Experime
 // Names samples that a loss takes out, channels of which the fit explains nothing, records that disagree with the
 // others, estimated sigmas far above the given ones, and channels that repeat another one.
 std::vector<std::string> doubts_of_fit(const FitContext& fit, const std::vector<ChannelRecord>& records,
-                                       const ExperimentStack& stack, const LeastSquaresResult& solution,
-                                       const std::vector<UnknownParameter>& unknowns);
+                                       const ExperimentStack& stack, const LeastSquaresResult& solution);
 
 // The column of a record that may be in degrees, since no unit is stated. It is likely if its measured values span
 // about 180/pi times as much as the model at the start or at the end of the fit, angles more than half a turn, and if

@@ -17,7 +17,8 @@ constexpr double kFarApart = 0.1;      // a change of the residuals over their s
 
 // Tukey's loss has no pull far out, so that a start there would find nothing: Huber's estimate comes first.
 template <class Estimate>
-LeastSquaresResult estimates_of(const Loss& loss, const Eigen::VectorXd& start, Estimate&& estimate) {
+LeastSquaresResult estimates_of(const Loss& loss, const ExperimentStack& stack, Estimate&& estimate) {
+  const Eigen::VectorXd start = stack.start();
   if (loss.type != LossType::tukey) return estimate(loss, start);
   LeastSquaresResult first = estimate(Loss{LossType::huber}, start);
   if (first.status == SolverStatus::failed || first.status == SolverStatus::stopped) return first;
@@ -176,12 +177,12 @@ void FitSearch::measure_costs_by_the_end(double cost_final) {
   if (!apart_.empty()) fit_.result.cost_initial = fit_.result.history.front().cost;
 }
 
-LeastSquaresResult FitSearch::solved(const Eigen::VectorXd& start) {
-  return estimates_of(fit_.spec.loss, start, [this](const auto& loss, const auto& x) { return estimate(loss, x); });
+LeastSquaresResult FitSearch::solved() {
+  return estimates_of(fit_.spec.loss, stack_, [this](const auto& loss, const auto& x) { return estimate(loss, x); });
 }
 
-LeastSquaresResult refit(const FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& start) {
-  return estimates_of(fit.spec.loss, start, [&](const Loss& loss, const Eigen::VectorXd& x) {
+LeastSquaresResult refit(const FitContext& fit, ExperimentStack& stack) {
+  return estimates_of(fit.spec.loss, stack, [&](const Loss& loss, const Eigen::VectorXd& x) {
     stack.loss = loss;
     return solve_with_equalities(stack, x, solver_options(fit));
   });

@@ -1,7 +1,7 @@
 // The search of a fit: least squares by rounds of sigmas and losses, and the history of its costs.
 //
-//   FitSearch search(fit, stack);
-//   const LeastSquaresResult solution = search.solved(start);
+//   FitSearch search(fit, stack);            // from the start of the stack
+//   const LeastSquaresResult solution = search.solved();
 //   search.measure_costs_by_the_end(solution.cost_final);
 #pragma once
 
@@ -20,7 +20,7 @@ class FitSearch {
  public:
   FitSearch(FitContext& fit, ExperimentStack& stack) : fit_(fit), stack_(stack) {}
 
-  LeastSquaresResult solved(const Eigen::VectorXd& start);
+  LeastSquaresResult solved();
   // Fills the costs of result.history, cost_initial and cost_final by the sigmas, the loss and the multipliers of the
   // end.
   void measure_costs_by_the_end(double cost_final);
@@ -46,6 +46,6 @@ class FitSearch {
 };
 
 // The refit of what validates, whose iterations are not those of the result; sigmas stay as they are.
-LeastSquaresResult refit(const FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& start);
+LeastSquaresResult refit(const FitContext& fit, ExperimentStack& stack);
 
 }  // namespace mbsopt::inline optim

@@ -7,7 +7,6 @@
 #include "optim/differences/difference_comparison.hpp"
 #include "optim/fit/fit_assessment.hpp"
 #include "optim/fit/fit_context.hpp"
-#include "optim/machine/on_threads.hpp"
 #include "optim/objective/integration_error.hpp"
 
 namespace mbsopt::inline optim {
@@ -15,19 +14,16 @@ namespace {
 
 using Eigen::Index;
 
-using Members = std::vector<ExperimentStack::Member>;
-
-// Residuals at u with one unknown moved. z: at u, those of the experiments that it does not act in.
-bool moved(const Members& members, const Eigen::VectorXd& u, Index k, double h, Experiment::Limits limits,
+// Moves one unknown by h. z: the residuals at u, which become those of the experiments that it acts in.
+bool moved(const ExperimentStack& stack, Eigen::VectorXd u, Index k, double h, Experiment::Limits limits,
            Eigen::VectorXd& z) {
   limits.derivatives = false;
-  Eigen::VectorXd at = u;
-  at(k) += h;
+  u(k) += h;
   Index row = 0;
-  for (const ExperimentStack::Member& m : members) {
+  for (const ExperimentStack::Member& m : stack.members()) {
     const Index n = static_cast<Index>(m.model.samples().size());
     if (std::ranges::find(m.model.unknowns(), k, &Experiment::Unknown::at) != m.model.unknowns().end()) {
-      const Experiment::Residuals r = m.model.residuals(at, limits);
+      const Experiment::Residuals r = m.model.residuals(u, limits);
       if (!r.ok) return false;
       z.segment(row, n) = r.z;
     }
@@ -36,36 +32,10 @@ bool moved(const Members& members, const Eigen::VectorXd& u, Index k, double h, 
   return true;
 }
 
-std::vector<Experiment::Residuals> simulated(const Members& members, const Eigen::VectorXd& u,
-                                             const Experiment::Limits& limits, int threads) {
-  std::vector<Experiment::Residuals> found(members.size());
-  on_threads(found.size(), threads, [&](std::size_t i) { found[i] = members[i].model.residuals(u, limits); });
-  return found;
-}
-
-// All residuals, one experiment below the other, and their derivatives.
-bool stacked(const std::vector<Experiment::Residuals>& found, Eigen::VectorXd& z, Eigen::MatrixXd& z_u) {
-  if (!std::ranges::all_of(found, &Experiment::Residuals::ok)) return false;
-  Index rows = 0, row = 0;
-  for (const Experiment::Residuals& r : found) rows += r.z.size();
-  z.resize(rows);
-  z_u.resize(rows, found.front().z_u.cols());
-  for (const Experiment::Residuals& r : found) {
-    z.segment(row, r.z.size()) = r.z;
-    z_u.middleRows(row, r.z.size()) = r.z_u;
-    row += r.z.size();
-  }
-  return true;
-}
-
 }  // namespace
 
 FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options) {
   const IdentificationSpec& spec = *problem.identification;
-  const std::vector<UnknownParameter> unknowns = unknowns_of_fit(problem.scene, spec);
-  const std::vector<std::string> names = names_of(unknowns, spec);
-  FitContext fit{problem.scene, spec, data, options};
-  const Members members = fitted_members(fit, unknowns);
   std::atomic<bool> abandoned = false;
   Experiment::Limits limits;
   if (options.simulation_progress)
@@ -73,37 +43,42 @@ FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data,
       if (!options.simulation_progress(t)) abandoned = true;
       return !abandoned;
     };
-  const Eigen::VectorXd u = start_of(unknowns);
-  const std::vector<Experiment::Residuals> found = simulated(members, u, limits, options.threads);
+  FitContext fit{problem.scene, spec, data, options, limits.progress};
+  ExperimentStack stack = fitted_stack(fit);
+  const Eigen::VectorXd x = stack.start(), u = stack.scaling().to_rho(x);
+  const std::vector<Experiment::Residuals> found = stack.residuals(u);
 
   SimulationStatistics statistics;
   name_experiments(fit);
   for (std::size_t i = 0; i < found.size(); ++i) {
-    if (found[i].ok) score_experiment(fit, members[i], found[i].z, false);
+    if (found[i].ok) score_experiment(fit, stack.members()[i], found[i].z, false);
     statistics.jumps.insert(statistics.jumps.end(), found[i].jumps.begin(), found[i].jumps.end());
   }
   FitStart start{std::move(fit.result), {}};
-  DifferenceComparison comparison;
-  if (!stacked(found, comparison.f, comparison.f_rho)) return start;
+  if (!std::ranges::all_of(found, &Experiment::Residuals::ok)) return start;
   Scene scene = problem.scene;
   scene.simulation = {};  // whose other warnings are said elsewhere
   std::vector<std::string> said = simulation_warnings(scene, scene.simulation, statistics);
 
-  for (std::size_t k = 0; k < unknowns.size(); ++k)
-    comparison.variables.push_back(compared_variable(names[k], unknowns[k].description));
+  DifferenceComparison comparison;
+  const LeastSquaresPoint at = stack.collected(found, x);
+  comparison.f = at.z.head(stack.samples()), comparison.f_rho = stack.z_rho(at, x).topRows(stack.samples());
+  for (const UnknownParameter& unknown : stack.unknowns())
+    comparison.variables.push_back(compared_variable(name_of(unknown, spec), unknown.description));
   comparison.groups = {{"the residuals", 0, comparison.f.size()}};
   comparison.go_on = [&] { return !abandoned; };
   comparison.threads = options.threads;
   comparison.at = [&](std::size_t k, double h) -> std::optional<Eigen::VectorXd> {
     Eigen::VectorXd z = comparison.f;
-    if (!moved(members, u, static_cast<Index>(k), h, limits, z)) return std::nullopt;
+    if (!moved(stack, u, static_cast<Index>(k), h, limits, z)) return std::nullopt;
     return z;
   };
-  comparison.tighter = [&](Eigen::VectorXd& z, Eigen::MatrixXd& z_u) {
+  comparison.tighter = [&](Eigen::VectorXd& z, Eigen::MatrixXd&) {
     const std::optional<Scene> tight = with_other_tolerances(problem.scene);
     if (!tight) return false;
-    const FitContext tighter{*tight, spec, data, options};
-    return stacked(simulated(fitted_members(tighter, unknowns), u, limits, options.threads), z, z_u);
+    const LeastSquaresPoint there = fitted_stack({*tight, spec, data, options, limits.progress}).at(x);
+    z = there.z.head(stack.samples());
+    return there.ok;
   };
   const std::vector<std::string> differences = comparison.warnings();
   said.insert(said.end(), differences.begin(), differences.end());

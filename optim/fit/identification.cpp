@@ -44,6 +44,12 @@ const IdentificationSpec& checked(const Problem& problem, const std::vector<CsvT
   return spec;
 }
 
+struct Fit {
+  IdentificationResult result = {};
+  std::vector<ChannelRecord> records = {};
+  std::vector<AngleDoubt> angles = {};
+};
+
 class Identification {
  public:
   Identification(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options)
@@ -55,10 +61,7 @@ class Identification {
       };
   }
 
-  const std::vector<AngleDoubt>& doubted_angles() const { return angles_; }
-  const std::vector<ChannelRecord>& records() const { return records_; }
-
-  IdentificationResult run() {
+  Fit run() {
     const Stopwatch stopwatch;
     search();
     const bool usable = fit_.result.status != SolverStatus::failed;
@@ -66,38 +69,36 @@ class Identification {
       if (fit_.spec.experiments[e].validate && usable && !fit_.abandoned && !fit_.options.preflight) validate(fit_, e);
     order_residuals();
     fit_.result.wall_seconds = stopwatch.seconds();
-    return std::move(fit_.result);
+    return {std::move(fit_.result), std::move(records_), std::move(angles_)};
   }
 
  private:
   void search() {
-    const std::vector<UnknownParameter> unknowns = unknowns_of_fit(fit_.scene, fit_.spec);
-    const VariableScaling scaling = scaling_of(unknowns);
-    ExperimentStack stack(fitted_members(fit_, unknowns), unknowns, scaling, fit_.spec.loss);
-    stack.go_on = fit_.go_on, stack.records = fit_.options.records, stack.threads = fit_.options.threads;
+    ExperimentStack stack = fitted_stack(fit_);
+    stack.records = fit_.options.records;
+    const std::vector<UnknownParameter>& unknowns = stack.unknowns();
     if (stack.size < stack.variables())
       throw std::invalid_argument(fmt::format("identification: {} cannot determine {}",
                                               counted(stack.samples(), "sample"),
                                               counted(stack.variables(), "parameter")));
     const std::vector<Eigen::Index> profiled = profiled_unknowns(fit_.options.profiles, names_of(unknowns, fit_.spec));
     FitSearch search(fit_, stack);
-    const LeastSquaresResult solution = search.solved(scaling.to_x(start_of(unknowns)));
+    const LeastSquaresResult solution = search.solved();
     fit_.result.status = fit_.abandoned ? SolverStatus::stopped : solution.status;
     fit_.result.message = fit_.abandoned ? "stopped on request" : solution.message;
     search.measure_costs_by_the_end(solution.cost_final);
     fit_.result.samples = static_cast<std::size_t>(stack.samples());
     name_experiments(fit_);
-    const Eigen::VectorXd values = scaling.to_rho(solution.x);
     const bool usable = solution.point.z.size() > 0;
     if (usable) {
       refuse_without_pull(stack, solution);
-      assess(stack, solution, unknowns);
+      assess(stack, solution);
     }
-    warn_of(stack, solution, usable ? search.residuals_at_start() : Eigen::VectorXd(), unknowns);
-    fit_.result.parameters = described(fit_, unknowns, values, fit_.result.statistics);
+    warn_of(stack, solution, usable ? search.residuals_at_start() : Eigen::VectorXd());
+    fit_.result.parameters = described(fit_, stack, solution.x, fit_.result.statistics);
     fit_.shared = parameter_values(fit_.scene);
     for (std::size_t i = 0; i < unknowns.size(); ++i)
-      if (unknowns[i].shared) fit_.shared(unknowns[i].parameter) = values(static_cast<Eigen::Index>(i));
+      if (unknowns[i].shared) fit_.shared(unknowns[i].parameter) = fit_.result.parameters[i].value;
     if (fit_.result.status == SolverStatus::converged)
       for (const Eigen::Index k : profiled)
         if (!fit_.abandoned) fit_.result.profiles.push_back(profile_of(fit_, stack, k, solution.x));
@@ -105,13 +106,12 @@ class Identification {
     fit_.result.simulations += stack.simulations();
   }
 
-  void assess(ExperimentStack& stack, const LeastSquaresResult& solution,
-              const std::vector<UnknownParameter>& unknowns) {
+  void assess(ExperimentStack& stack, const LeastSquaresResult& solution) {
     score_all(fit_, stack, solution.point.z, fit_.sigmas_are_estimated);
-    fit_.result.statistics = statistics_at(fit_, solution, stack, unknowns);
-    const Eigen::MatrixXd J = z_in_parameters(stack, solution.point, solution.x).topRows(stack.samples());
+    fit_.result.statistics = statistics_at(fit_, solution, stack);
+    const Eigen::MatrixXd J = stack.z_rho(solution.point, solution.x).topRows(stack.samples());
     predict(fit_, stack, J, fit_.result.statistics.covariance, 0);
-    find_influences(fit_, stack, solution, unknowns);
+    find_influences(fit_, stack, solution);
     const std::size_t sigmas = fit_.sigmas_are_estimated ? SigmaEstimation(stack, fit_.spec).scale_groups().size() : 0;
     compare_by_likelihood(fit_, stack, solution.point.z, sigmas);
   }
@@ -130,8 +130,7 @@ class Identification {
         pulling, counted(stack.samples(), "sample"), stack.loss.s(), counted(stack.variables(), "parameter"));
   }
 
-  void warn_of(const ExperimentStack& stack, const LeastSquaresResult& solution, const Eigen::VectorXd& at_start,
-               const std::vector<UnknownParameter>& unknowns) {
+  void warn_of(const ExperimentStack& stack, const LeastSquaresResult& solution, const Eigen::VectorXd& at_start) {
     for (const std::string& name : fit_.spec.variables)
       for (const Parameter& p : fit_.scene.parameters)
         if (p.name == name && is_held(p))
@@ -155,8 +154,7 @@ class Identification {
     doubt_sigmas();
     records_ = channel_records(fit_, stack);
     if (!fit_.options.preflight)
-      std::ranges::move(doubts_of_fit(fit_, records_, stack, solution, unknowns),
-                        std::back_inserter(fit_.result.warnings));
+      std::ranges::move(doubts_of_fit(fit_, records_, stack, solution), std::back_inserter(fit_.result.warnings));
     if (fit_.options.tests_angles) angles_ = angle_doubts(fit_, records_, stack, at_start);
   }
 
@@ -187,17 +185,10 @@ class Identification {
   std::mutex told_;
 };
 
-struct Fit {
-  IdentificationResult result;
-  std::vector<ChannelRecord> records;
-  std::vector<AngleDoubt> angles;
-};
-
 Fit fit_of(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options) {
   const CutProblem cut =
       cut_into_windows(what_measurements_need(problem), data, options.user_forces, options.simulation_progress);
-  Identification identification(cut.problem, cut.data, options);
-  Fit fit{identification.run(), identification.records(), identification.doubted_angles()};
+  Fit fit = Identification(cut.problem, cut.data, options).run();
   fit.result.warnings.insert(fit.result.warnings.begin(), cut.warnings.begin(), cut.warnings.end());
   return fit;
 }

@@ -18,30 +18,15 @@ namespace {
 
 constexpr double kWorse = 0.99;  // probability that a right model worsens what validates by less
 
-std::vector<ExperimentStack::Member> alone(const FitContext& fit, std::size_t e, const Eigen::VectorXd& shared,
-                                           const std::vector<UnknownParameter>& unknowns) {
-  std::vector<ExperimentStack::Member> members;
-  members.push_back(member(fit, e, shared, unknowns));
-  return members;
-}
-
-LeastSquaresPoint simulated(ExperimentStack& stack, const Eigen::VectorXd& x) {
-  LeastSquaresPoint point;
-  point.z.setZero(stack.size), point.z_x.setZero(stack.size, stack.variables());
-  stack.evaluate(x, point);
-  return point;
-}
-
 // Has no residuals if nothing could be simulated.
-LeastSquaresResult refitted(const FitContext& fit, ExperimentStack& stack,
-                            const std::vector<UnknownParameter>& unknowns) {
+LeastSquaresResult refitted(const FitContext& fit, ExperimentStack& stack) {
   LeastSquaresResult found;
-  if (unknowns.empty()) {
-    found.point = simulated(stack, found.x);
+  if (stack.unknowns().empty()) {
+    found.point = stack.at(found.x);
     found.message = found.point.ok ? "simulated" : "could not be simulated: " + found.point.message;
     if (!found.point.ok) found.point.z.resize(0);
   } else {
-    found = refit(fit, stack, stack.scaling().to_x(start_of(unknowns)));
+    found = refit(fit, stack);
     found.message = "refitted, " + found.message;
   }
   return found;
@@ -59,24 +44,23 @@ struct Sensitivities {
 std::optional<Sensitivities> sensitivities(FitContext& fit, std::size_t e, const ExperimentStack& stack,
                                            const LeastSquaresResult& found) {
   if (!fit.result.statistics.none.empty()) return std::nullopt;
+  std::vector<UnknownParameter> all = stack.unknowns();  // with their values; then the shared ones
+  const Eigen::Index F = std::ssize(all), N = stack.samples();
+  const Eigen::VectorXd own = stack.scaling().to_rho(found.x);
+  for (Eigen::Index k = 0; k < F; ++k) all[static_cast<std::size_t>(k)].description.value = own(k);
   const std::vector<UnknownParameter> fitted = unknowns_of_fit(fit.scene, fit.spec);
-  std::vector<UnknownParameter> all = free_in(fit.scene, fit.spec, e);
-  const Eigen::Index F = static_cast<Eigen::Index>(all.size()), N = stack.samples();
   std::vector<Eigen::Index> shared;
-  for (std::size_t i = 0; i < fitted.size(); ++i)
-    if (fitted[i].shared) all.push_back(fitted[i]), shared.push_back(static_cast<Eigen::Index>(i));
-  const VariableScaling scaling = scaling_of(all);
-  ExperimentStack whole(alone(fit, e, fit.shared, all), all, scaling, fit.spec.loss);
-  whole.go_on = fit.go_on;
-  Eigen::VectorXd rho(static_cast<Eigen::Index>(all.size()));
-  if (F > 0) rho.head(F) = stack.scaling().to_rho(found.x);
-  for (std::size_t i = 0; i < shared.size(); ++i)
-    rho(F + static_cast<Eigen::Index>(i)) = fit.shared(all[static_cast<std::size_t>(F) + i].parameter);
-  const Eigen::VectorXd x = scaling.to_x(rho);
-  const LeastSquaresPoint point = simulated(whole, x);
+  for (std::size_t i = 0; i < fitted.size(); ++i) {
+    if (!fitted[i].shared) continue;
+    shared.push_back(static_cast<Eigen::Index>(i)), all.push_back(fitted[i]);
+    all.back().description.value = fit.shared(fitted[i].parameter);
+  }
+  ExperimentStack whole = stack_of(fit, {e}, fit.shared, std::move(all));
+  const Eigen::VectorXd x = whole.start();
+  const LeastSquaresPoint point = whole.at(x);
   fit.result.simulations += whole.simulations();
   if (!point.ok) return std::nullopt;
-  const Eigen::MatrixXd J = z_in_parameters(whole, point, x).topRows(N);
+  const Eigen::MatrixXd J = whole.z_rho(point, x).topRows(N);
   Sensitivities s{J.leftCols(F), J.rightCols(J.cols() - F), {}, fit.result.statistics.covariance(shared, shared)};
   if (F == 0) return s;
   s.f_s = -OrthogonalDecomposition(s.J_f).solve(s.J);
@@ -110,12 +94,10 @@ void predict_validation(FitContext& fit, const ExperimentStack& stack, const Sen
 // Warns if the fit has learnt something wrong. A right model that starts at the true values raises the squares of what
 // validates by about chi^2 of its P parameters, for as many samples as are fitted. Correlated residuals raise them
 // more.
-void compare_with_start(FitContext& fit, std::size_t e, const std::vector<UnknownParameter>& unknowns,
-                        const VariableScaling& scaling, double squares) {
+void compare_with_start(FitContext& fit, std::size_t e, double squares) {
   const FitStatistics& s = fit.result.statistics;
-  ExperimentStack before(alone(fit, e, parameter_values(fit.scene), unknowns), unknowns, scaling, fit.spec.loss);
-  before.go_on = fit.go_on;
-  const LeastSquaresResult start = refitted(fit, before, unknowns);
+  ExperimentStack before = stack_of(fit, {e}, parameter_values(fit.scene), free_in(fit.scene, fit.spec, e));
+  const LeastSquaresResult start = refitted(fit, before);
   fit.result.simulations += before.simulations();
   if (start.point.z.size() == 0 || fit.abandoned) return;
   const double n = static_cast<double>(before.samples());
@@ -137,31 +119,26 @@ void compare_with_start(FitContext& fit, std::size_t e, const std::vector<Unknow
 }  // namespace
 
 void validate(FitContext& fit, std::size_t e) {
-  const std::vector<UnknownParameter> unknowns = free_in(fit.scene, fit.spec, e);
-  const VariableScaling scaling = scaling_of(unknowns);
-  ExperimentStack stack(alone(fit, e, fit.shared, unknowns), unknowns, scaling, fit.spec.loss);
-  stack.go_on = fit.go_on;
-  const LeastSquaresResult found = refitted(fit, stack, unknowns);
+  ExperimentStack stack = stack_of(fit, {e}, fit.shared, free_in(fit.scene, fit.spec, e));
+  const bool refits = !stack.unknowns().empty();
+  const LeastSquaresResult found = refitted(fit, stack);
   ExperimentFit& scored = fit.result.experiments[e];
   scored.message = found.message;
+  FitStatistics own;
   if (found.point.z.size() > 0) {
     const std::size_t first = fit.result.residuals.size();
     score_all(fit, stack, found.point.z, false);
-    const Eigen::VectorXd values = scaling.to_rho(found.x);
-    FitStatistics own;
-    if (!unknowns.empty()) own = statistics_at(fit, found, stack, unknowns);
+    if (refits) own = statistics_at(fit, found, stack);
     const std::optional<Sensitivities> of_samples = sensitivities(fit, e, stack, found);
     if (of_samples && own.none.empty()) {
-      if (!unknowns.empty()) add_shared_errors(own, values, *of_samples, fit.result.statistics.quantile);
+      if (refits) add_shared_errors(own, stack.scaling().to_rho(found.x), *of_samples, fit.result.statistics.quantile);
       predict_validation(fit, stack, *of_samples, own, first);
-    } else if (!unknowns.empty()) {
+    } else if (refits) {
       withhold_errors(own, "those of the shared parameters are not known");
     }
-    scored.refitted = described(fit, unknowns, values, own);
-    compare_with_start(fit, e, unknowns, scaling, found.point.z.head(stack.samples()).squaredNorm());
-  } else if (!unknowns.empty()) {
-    scored.refitted = described(fit, unknowns, scaling.to_rho(found.x), FitStatistics());
+    compare_with_start(fit, e, found.point.z.head(stack.samples()).squaredNorm());
   }
+  scored.refitted = described(fit, stack, found.x, own);
   fit.result.simulations += stack.simulations();
 }
 

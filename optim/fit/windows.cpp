@@ -148,21 +148,19 @@ class Cut {
     const Experiment model(scene_, window, place_, rows, rho, here, user_forces_);
     require_starts(model);
     alone.experiments[0].end_time.reset(), alone.experiments[0].origin->continues = false;
-    const VariableScaling scaling = scaling_of(unknowns);
     std::vector<ExperimentStack::Member> members;
     members.push_back({0, Experiment(scene_, alone.experiments[0], place_, smoothed(model), rho, here, user_forces_)});
-    ExperimentStack stack(std::move(members), unknowns, scaling, {});
-    stack.go_on = go_on_;
+    ExperimentStack stack(std::move(members), unknowns, {}, go_on_);
     LeastSquaresOptions options;
     options.tolerance = 1e-6;  // of a guess
-    const LeastSquaresResult found = solve_least_squares(stack, scaling.to_x(start_of(unknowns)), options);
+    const LeastSquaresResult found = solve_least_squares(stack, stack.start(), options);
     if (abandoned_) return;
     if (found.point.z.size() == 0) {
       warnings.push_back(fmt::format("{}.windows: the start of window {} could not be guessed: {}", place_,
                                      window.origin->number, found.message));
       return;
     }
-    const VectorXd values = scaling.to_rho(found.x);
+    const VectorXd values = stack.scaling().to_rho(found.x);
     for (std::size_t i = 0; i < unknowns.size(); ++i)
       set_override(window, unknowns[i].description.name, values(static_cast<Index>(i)));
   }

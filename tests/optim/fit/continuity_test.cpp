@@ -44,8 +44,7 @@ struct Tied {
   explicit Tied(const Problem& problem, const CsvTable& data)
       : cut(cut_into_windows(problem, {data})),
         unknowns(unknowns_of_fit(cut.problem.scene, spec())),
-        scaling(scaling_of(unknowns)),
-        stack(members(), unknowns, scaling, {}) {}
+        stack(members(), unknowns, {}) {}
   const IdentificationSpec& spec() const { return *cut.problem.identification; }
   Experiment window(std::size_t e) const {
     const Scene& scene = cut.problem.scene;
@@ -59,16 +58,13 @@ struct Tied {
     return all;
   }
   LeastSquaresPoint at(const VectorXd& x) {
-    LeastSquaresPoint point;
-    point.z.setZero(stack.size), point.z_x.setZero(stack.size, stack.variables());
-    stack.evaluate(x, point);
+    LeastSquaresPoint point = stack.at(x);
     REQUIRE(point.ok);
     return point;
   }
 
   CutProblem cut;
   std::vector<UnknownParameter> unknowns;
-  VariableScaling scaling;
   ExperimentStack stack;
 };
 
@@ -79,7 +75,7 @@ TEST_CASE("continuity: the equations and their derivatives, against differences"
   p.scene.simulation.integrator.step = 0.005;
   Tied tied(p, motion(in_one(p), 0, 1.5));
   CHECK(tied.stack.equalities == 2 * 4);  // three windows
-  VectorXd x = tied.scaling.to_x(start_of(tied.unknowns));
+  VectorXd x = tied.stack.start();
   CHECK(tied.at(x).z.tail(8).norm() < 0.2);  // starts are guessed from the motion
   x(0) *= 1.1, x(3) += 0.1;
   const MatrixXd C = tied.at(x).z_x.bottomRows(8);
