@@ -47,23 +47,16 @@ MatrixXd reduced_rows(MatrixXd rows, std::vector<Index>& pivots) {
 
 class Group {
  public:
-  Group(std::vector<Index> members, const MatrixXd& P, const VectorXd& rho, const VectorXd& size,
+  Group(const std::vector<Index>& members, const MatrixXd& P, const VectorXd& rho, const VectorXd& size,
         const std::vector<std::string>& names, const std::vector<std::string>& units)
-      : members_(std::move(members)) {
-    const Index c = static_cast<Index>(members_.size());
-    MatrixXd inside(c, c);
-    rho_.resize(c), size_.resize(c);
-    for (Index i = 0; i < c; ++i) {
-      const Index k = members_[static_cast<std::size_t>(i)];
-      for (Index j = 0; j < c; ++j) inside(i, j) = P(k, members_[static_cast<std::size_t>(j)]);
-      rho_(i) = rho(k), size_(i) = size(k);
+      : rho_(rho(members)), size_(size(members)) {
+    for (const Index k : members) {
       names_.push_back(names[static_cast<std::size_t>(k)]);
       units_.push_back(units.empty() ? "" : units[static_cast<std::size_t>(k)]);
     }
     // A projector's singular values are 1 and 0.
-    const LeftSingular svd = left_singular(inside);
-    const Index free = (svd.values.array() > 0.5).count();
-    Q_ = svd.U.rightCols(c - free);
+    const LeftSingular svd = left_singular(P(members, members));
+    Q_ = svd.U.rightCols((svd.values.array() <= 0.5).count());
     rows_ = reduced_rows(Q_.transpose(), pivots_);
   }
 
@@ -81,47 +74,39 @@ class Group {
 
  private:
   // rows_ with each parameter in the given unit instead of its size; pivots stay 1.
-  MatrixXd rows_in(const VectorXd& unit_over_size) const {
-    MatrixXd rows = rows_;
-    for (Index r = 0; r < rows.rows(); ++r)
-      rows.row(r) =
-          rows_.row(r).cwiseProduct(unit_over_size.transpose()) / unit_over_size(pivots_[static_cast<std::size_t>(r)]);
+  std::vector<VectorXd> rows_in(const VectorXd& unit_over_size) const {
+    std::vector<VectorXd> rows;
+    for (const Index pivot : pivots_)
+      rows.push_back(rows_.row(std::ssize(rows)).transpose().cwiseProduct(unit_over_size) / unit_over_size(pivot));
     return rows;
   }
-  MatrixXd absolute_rows() const { return rows_in(size_.cwiseInverse()); }       // in changes d rho
-  MatrixXd relative_rows() const { return rows_in(rho_.cwiseQuotient(size_)); }  // in d rho/rho
+  std::vector<VectorXd> absolute_rows() const { return rows_in(size_.cwiseInverse()); }       // in changes d rho
+  std::vector<VectorXd> relative_rows() const { return rows_in(rho_.cwiseQuotient(size_)); }  // in d rho/rho
 
   std::optional<std::vector<std::string>> in_sums() const {
-    const MatrixXd rows = absolute_rows();
-    for (const double x : rows.reshaped())
-      if (x != 0 && !is_near(std::abs(x), 1)) return std::nullopt;
-    for (Index r = 0; r < rows.rows(); ++r) {
-      std::set<std::string> units;
-      for (Index k = 0; k < rows.cols(); ++k)
-        if (rows(r, k) != 0) units.insert(units_[static_cast<std::size_t>(k)]);
-      units.erase("");
-      if (units.size() > 1) return std::nullopt;
+    for (const VectorXd& row : absolute_rows()) {
+      std::set<std::string> units{""};  // of a sum: one, or unknown
+      for (Index k = 0; k < row.size(); ++k) {
+        if (row(k) == 0) continue;
+        units.insert(units_[static_cast<std::size_t>(k)]);
+        if (!is_near(std::abs(row(k)), 1) || units.size() > 2) return std::nullopt;
+      }
     }
     return linear_terms();
   }
 
   std::optional<std::vector<std::string>> in_products() const {
     if ((rho_.array() == 0).any()) return std::nullopt;
-    const MatrixXd exponents = relative_rows();
+    constexpr double kDenominators[] = {1, 2, 3};
     std::vector<std::string> terms;
-    for (Index r = 0; r < exponents.rows(); ++r) {
-      double denominator = 0;
-      for (const double d : {1.0, 2.0, 3.0}) {
-        const VectorXd scaled = d * exponents.row(r).transpose();
-        const bool whole = std::all_of(scaled.begin(), scaled.end(),
-                                       [](double x) { return is_near(x, std::round(x)) && std::abs(x) < 6.5; });
-        if (whole) {
-          denominator = d;
-          break;
-        }
-      }
-      if (denominator == 0) return std::nullopt;
-      terms.push_back(product(denominator * exponents.row(r).transpose()));
+    for (const VectorXd& exponents : relative_rows()) {
+      const auto* const d = std::ranges::find_if(kDenominators, [&](double factor) {
+        const VectorXd scaled = factor * exponents;
+        return std::all_of(scaled.begin(), scaled.end(),
+                           [](double x) { return is_near(x, std::round(x)) && std::abs(x) < 6.5; });
+      });
+      if (d == std::end(kDenominators)) return std::nullopt;
+      terms.push_back(product(*d * exponents));
     }
     return terms;
   }
@@ -143,14 +128,13 @@ class Group {
   }
 
   std::vector<std::string> linear_terms() const {
-    const MatrixXd rows = absolute_rows();
     std::vector<std::string> terms;
-    for (Index r = 0; r < rows.rows(); ++r) {
+    for (const VectorXd& row : absolute_rows()) {
       std::vector<double> factors;
       std::vector<std::string> names;
-      for (Index k = 0; k < rows.cols(); ++k) {
-        if (rows(r, k) == 0) continue;
-        factors.push_back(is_near(std::abs(rows(r, k)), 1) ? std::copysign(1, rows(r, k)) : rows(r, k));
+      for (Index k = 0; k < row.size(); ++k) {
+        if (row(k) == 0) continue;
+        factors.push_back(is_near(std::abs(row(k)), 1) ? std::copysign(1, row(k)) : row(k));
         names.push_back(names_[static_cast<std::size_t>(k)]);
       }
       terms.push_back(sum_in_words(factors, names));
@@ -158,7 +142,6 @@ class Group {
     return terms;
   }
 
-  std::vector<Index> members_;
   std::vector<std::string> names_, units_;
   VectorXd rho_, size_;
   MatrixXd Q_, rows_;  // determined combinations, in changes over sizes: orthonormal columns, and reduced rows
