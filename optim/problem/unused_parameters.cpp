@@ -1,7 +1,7 @@
 #include "optim/problem/unused_parameters.hpp"
 
 #include <algorithm>
-#include <numeric>
+#include <memory>
 #include <set>
 #include <unordered_map>
 #include <utility>
@@ -55,12 +55,16 @@ class MentionSearch {
       for (const std::string& body : bodies_of(*user)) add(ElementKind::body, body, found);
   }
   void add(const Sensor& sensor, Mentions& found) const {
-    found.whole = found.whole || measures_everything(sensor);
+    if (measures_everything(sensor)) add_whole(found);
     describe_to(found, sensor);
   }
   void add(const ObjectiveSpec& objective, Mentions& found) const {
-    found.whole = found.whole || objective.eigenvalue || (objective.user && objective.user->bodies.empty());
+    if (objective.eigenvalue || (objective.user && objective.user->bodies.empty())) add_whole(found);
     describe_to(found, objective);
+  }
+  void add_whole(Mentions& found) const {
+    found.whole = true;
+    for (const Body& body : facts_.scene().bodies) found.bodies.insert(body.name);
   }
   void add(const Expression& expression, Scope names, Mentions& found) const {
     if (expression.is_number()) return;
@@ -120,83 +124,62 @@ class MentionSearch {
   SceneFacts facts_;
 };
 
-// Sets of bodies that joints, forces and conditions connect. Make all connections before a query. The ground is no body
-// here.
-class ConnectedBodies {
- public:
-  explicit ConnectedBodies(const std::vector<Body>& bodies) : parent_(bodies.size()), is_observed_(bodies.size()) {
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-    for (std::size_t i = 0; i < bodies.size(); ++i) index_.emplace(bodies[i].name, i);
-  }
-
-  void connect(const Mentions& mentions) {
-    const std::vector<std::size_t> bodies = roots_of(mentions);
-    for (const std::size_t body : bodies) parent_[root_of(body)] = root_of(bodies.front());
-  }
-  void observe(const Mentions& mentions) {
-    for (const std::size_t body : roots_of(mentions)) is_observed_[body] = true;
-  }
-  // Returns whether any of the bodies is connected with an observed one.
-  bool matter(const Mentions& mentions) {
-    return std::ranges::any_of(roots_of(mentions), [&](std::size_t body) { return is_observed_[body]; });
-  }
-
- private:
-  std::vector<std::size_t> roots_of(const Mentions& mentions) {
-    std::vector<std::size_t> roots;
-    if (mentions.whole)
-      for (std::size_t i = 0; i < parent_.size(); ++i) roots.push_back(root_of(i));
-    else
-      for (const std::string& body : mentions.bodies) roots.push_back(root_of(index_.at(body)));
-    return roots;
-  }
-  std::size_t root_of(std::size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-
-  std::vector<std::size_t> parent_;
-  std::vector<bool> is_observed_;  // of roots
-  std::unordered_map<std::string, std::size_t> index_;
-};
-
 // Collects what the objectives and measurements of a problem depend on. Without any, a sensor of everything replaces
-// them.
+// them. Joints, forces and conditions on an observed body make all their bodies observed. The ground is no body here.
 class Reach {
  public:
-  explicit Reach(const Problem& problem) : scene_(problem.scene), search_(scene_), bodies_(scene_.bodies) {
-    std::vector<Mentions> model;
+  explicit Reach(const Problem& problem) : scene_(problem.scene), search_(scene_) {
+    Mentions observed = observed_by(problem);
+    if (problem.objectives.empty() && !problem.identification) {
+      for (const Sensor& sensor : scene_.sensors) search_.add(sensor, observed);
+      search_.add_whole(observed);
+    }
+    if (!observed.bodies.empty())
+      for (const Field& field : scene_.gravity) search_.add(field, Scope::none, observed);
+    std::unordered_map<std::string, std::vector<std::shared_ptr<Mentions>>> acting;  // on each body
     const auto add = [&](const auto& elements) {
-      for (const auto& element : elements) bodies_.connect(model.emplace_back(search_.of(element)));
+      for (const auto& element : elements) {
+        const auto mentions = std::make_shared<Mentions>(search_.of(element));
+        for (const std::string& body : mentions->bodies) acting[body].push_back(mentions);
+      }
     };
     add(scene_.bodies), add(scene_.joints), add(scene_.drives), add(scene_.forces), add(scene_.conditions);
-    Mentions observed = observed_by(problem);
-    bodies_.observe(observed);
-    if (observed.whole || !observed.bodies.empty())
-      for (const Field& field : scene_.gravity) search_.add(field, Scope::none, observed);
-    for (Mentions& element : model)
-      if (bodies_.matter(element)) observed.parameters.merge(element.parameters);
-    parameters_ = std::move(observed.parameters);
+    parameters_ = std::move(observed.parameters), bodies_ = std::move(observed.bodies);
+    std::vector<std::string> found(bodies_.begin(), bodies_.end());
+    while (!found.empty()) {
+      const std::vector<std::shared_ptr<Mentions>> here = std::move(acting[found.back()]);
+      found.pop_back();
+      for (const std::shared_ptr<Mentions>& element : here) {
+        parameters_.merge(element->parameters);
+        for (const std::string& body : element->bodies)
+          if (bodies_.insert(body).second) found.push_back(body);
+        element->bodies.clear();
+      }
+    }
   }
 
   const std::set<std::string>& parameters() const { return parameters_; }
 
   // The scene without bodies that nothing observed depends on, and without elements that act on these alone.
-  Scene needed(std::vector<std::string>& left_out) {
-    const auto is_idle = [&](const auto& element) { return !bodies_.matter(search_.of(element)); };
-    std::set<std::string> gone;
+  Scene needed(std::vector<std::string>* left_out) const {
+    const auto is_observed = [&](const std::string& body) { return bodies_.contains(body); };
+    const auto is_idle = [&](const auto& element) {
+      return std::ranges::none_of(search_.of(element).bodies, is_observed);
+    };
+    std::vector<std::string> gone;
     for (const Body& body : scene_.bodies)
-      if (is_idle(body)) left_out.push_back(body.name), gone.insert(body.name);
+      if (!is_observed(body.name)) gone.push_back(body.name);
     Scene needed = scene_;
-    if (left_out.empty() || left_out.size() == scene_.bodies.size()) return left_out.clear(), needed;
+    if (gone.empty() || bodies_.empty()) return needed;
+    if (left_out) *left_out = std::move(gone);
     std::erase_if(needed.bodies, is_idle);
     std::erase_if(needed.joints, is_idle);
     std::erase_if(needed.drives, is_idle);
     std::erase_if(needed.forces, is_idle);
     std::erase_if(needed.conditions, is_idle);
     std::erase_if(needed.sensors, [&](const Sensor& sensor) {
-      const std::set<std::string> read = search_.of(sensor).bodies;
-      return std::ranges::any_of(read, [&](const std::string& body) { return gone.contains(body); });
+      const Mentions read = search_.of(sensor);
+      return !read.whole && !std::ranges::all_of(read.bodies, is_observed);
     });
     return needed;
   }
@@ -211,17 +194,12 @@ class Reach {
         for (const DriveLaw& law : experiment.drives)
           if (!law.samples) search_.add(law.law, Scope::time_law, observed);
       }
-    if (problem.objectives.empty() && !problem.identification) {
-      for (const Sensor& sensor : scene_.sensors) search_.add(sensor, observed);
-      observed.whole = true;
-    }
     return observed;
   }
 
   const Scene& scene_;
   MentionSearch search_;
-  ConnectedBodies bodies_;
-  std::set<std::string> parameters_;
+  std::set<std::string> bodies_, parameters_;  // observed; in use
 };
 
 // The parameters in use in the problem or in one of its load cases, by the names of the problem.
@@ -238,23 +216,24 @@ std::set<std::string> used_in(const Problem& problem) {
 }
 
 // The problem with only those objectives that its design uses.
-Problem as_designed(const Problem& problem) {
-  Problem designed;
-  designed.scene = problem.scene, designed.cases = problem.cases;
-  for (const ObjectiveSpec& objective : problem.objectives) {
-    const std::vector<ObjectiveBound>& bounds = problem.design->subject_to;
-    const auto bounds_it = [&](const ObjectiveBound& bound) { return bound.objective == objective.name; };
-    if (objective.name == problem.design->minimize || std::any_of(bounds.begin(), bounds.end(), bounds_it))
-      designed.objectives.push_back(objective);
-  }
-  return designed;
+Problem as_designed(Problem problem) {
+  problem.identification.reset();
+  std::erase_if(problem.objectives, [&](const ObjectiveSpec& objective) {
+    const auto& bounds = problem.design->subject_to;
+    return objective.name != problem.design->minimize &&
+           std::ranges::find(bounds, objective.name, &ObjectiveBound::objective) == bounds.end();
+  });
+  return problem;
 }
 
-Problem as_identified(const Problem& problem) {
-  Problem identified;
-  identified.scene = problem.scene;
-  identified.identification = problem.identification;
-  return identified;
+Problem as_identified(Problem problem) {
+  problem.objectives.clear(), problem.cases.clear();
+  return problem;
+}
+
+Problem without_measurements(Problem problem) {
+  problem.identification.reset(), problem.cases.clear();
+  return problem;
 }
 
 void add_idle(const std::vector<std::string>& variables, const Problem& judged_by, const std::string& list,
@@ -270,22 +249,17 @@ void add_idle(const std::vector<std::string>& variables, const Problem& judged_b
   }
 }
 
-// Without objectives and identification, every use of a parameter counts.
-std::set<std::string> used_anywhere(const Problem& problem) {
-  Problem model_only;
-  model_only.scene = problem.scene;
-  return Reach(model_only).parameters();
-}
-
-// This counts coefficients that a law replaces, too.
-std::set<std::string> used_beside_laws(Problem problem) {
+// Whatever uses a parameter counts, also coefficients if no law replaces them.
+std::set<std::string> used_anywhere(Problem problem, bool with_laws) {
+  problem.objectives.clear(), problem.identification.reset();
   for (Force& force : problem.scene.forces)
     std::visit(
-        [](auto& kind) {
-          if constexpr (requires { kind.law; }) kind.law.reset();
+        [&](auto& kind) {
+          if constexpr (requires { kind.law; })
+            if (!with_laws) kind.law.reset();
         },
         force.kind);
-  return used_anywhere(problem);
+  return Reach(problem).parameters();
 }
 
 }  // namespace
@@ -297,7 +271,7 @@ std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
   for (const Parameter& parameter : problem.scene.parameters)
     if (!parameter.allow_unused && !used.contains(parameter.name)) unused.push_back(&parameter);
   if (unused.empty()) return issues;
-  const std::set<std::string> anywhere = used_anywhere(problem), beside_laws = used_beside_laws(problem);
+  const std::set<std::string> anywhere = used_anywhere(problem, true), beside_laws = used_anywhere(problem, false);
   for (const Parameter* const parameter : unused) {
     const std::string what =
         anywhere.contains(parameter->name)
@@ -313,41 +287,29 @@ std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
 void allow_what_only_measurements_use(Problem& problem) {
   if (problem.objectives.empty() || (!problem.identification && problem.cases.empty())) return;
   const std::set<std::string> used = used_in(problem);
-  Problem judged = problem;
-  judged.identification.reset(), judged.cases.clear();
-  const std::set<std::string> by_objectives = Reach(judged).parameters();
+  const std::set<std::string> by_objectives = Reach(without_measurements(problem)).parameters();
   for (Parameter& p : problem.scene.parameters)
     p.allow_unused = p.allow_unused || (used.contains(p.name) && !by_objectives.contains(p.name));
 }
 
 Problem what_objectives_need(const Problem& problem, std::vector<std::string>* left_out) {
   Problem needed = problem;
-  std::vector<std::string> names;
   // Costs written in C++ read the state by the numbers of bodies: they need all bodies.
   const bool opaque = std::ranges::any_of(problem.objectives, &ObjectiveSpec::is_written_in_cpp);
-  if (!problem.objectives.empty() && !opaque) {
-    Problem judged = problem;
-    judged.identification.reset();
-    needed.scene = Reach(judged).needed(names);
-  }
-  if (left_out) *left_out = std::move(names);
+  if (!problem.objectives.empty() && !opaque) needed.scene = Reach(without_measurements(problem)).needed(left_out);
   return needed;
 }
 
 Problem what_measurements_need(const Problem& problem, std::vector<std::string>* left_out) {
   Problem needed = problem;
-  std::vector<std::string> names;
-  if (problem.identification) {
-    needed.scene = Reach(as_identified(problem)).needed(names);
-    const auto has = [](const Scene& scene, const std::string& drive) {
-      return std::any_of(scene.drives.begin(), scene.drives.end(), [&](const Drive& d) { return d.name == drive; });
-    };
-    const auto is_left_out = [&](const DriveLaw& law) {
-      return has(problem.scene, law.drive) && !has(needed.scene, law.drive);
-    };
-    for (ExperimentSpec& experiment : needed.identification->experiments) std::erase_if(experiment.drives, is_left_out);
-  }
-  if (left_out) *left_out = std::move(names);
+  if (!problem.identification) return needed;
+  needed.scene = Reach(as_identified(problem)).needed(left_out);
+  const auto has = [](const Scene& scene, const DriveLaw& law) {
+    return std::ranges::find(scene.drives, law.drive, &Drive::name) != scene.drives.end();
+  };
+  for (ExperimentSpec& experiment : needed.identification->experiments)
+    std::erase_if(experiment.drives,
+                  [&](const DriveLaw& law) { return has(problem.scene, law) && !has(needed.scene, law); });
   return needed;
 }
 
