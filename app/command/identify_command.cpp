@@ -268,31 +268,16 @@ std::vector<PointTarget> measured_points(const Problem& fitted, const Scene& sce
   return point_targets(scene, values, true);
 }
 
-// The report shows the first experiment's motion as fitted.
-struct FittedMotion {
-  std::optional<SimulatedExperiment> after;
-  std::vector<PointTarget> measured;
-};
-
-FittedMotion fitted_motion(Run& run, const Problem& needed, const std::vector<CsvTable>& data,
-                           const IdentificationResult& fit) {
-  FittedMotion motion;
-  const Problem fitted = with_fitted_values(needed, fit);
-  motion.after = simulated_experiment(run, simulated_scene(fitted, data));
-  run.progress.finish();
-  motion.measured = measured_points(fitted, motion.after->scene, fit);
-  return motion;
-}
-
-// The report omits motions if a simulation stopped. start holds all experiments.
-std::string report_of(const Run& run, const CutProblem& cut, const SimulatedExperiment& before,
-                      const IdentificationResult& start, const FittedMotion& motion, const IdentificationResult& fit,
+// The report omits motions if a simulation stopped. start holds all experiments; explained has the fitted values.
+std::string report_of(const Run& run, const CutProblem& cut, const IdentificationResult& start,
+                      const SimulatedExperiment& before, const Problem& explained,
+                      const std::optional<SimulatedExperiment>& after, const IdentificationResult& fit,
                       const Trajectory& history) {
   std::vector<MovingState> states;
-  const std::optional<SimulatedExperiment>& after = motion.after;
   if (after && after->simulation.ok()) {
+    const std::vector<PointTarget> measured = measured_points(explained, after->scene, fit);
     states.push_back({"initial", before.scene, before.trajectory, true});
-    states.push_back({"fitted", after->scene, after->trajectory, false, motion.measured, after->forces});
+    states.push_back({"fitted", after->scene, after->trajectory, false, measured, after->forces});
   }
   return identification_report(run.problem.scene, run.result, history, fit_plots(cut.problem, cut.data, fit, start),
                                states);
@@ -369,15 +354,17 @@ int identify_command(const CommandContext& context) {
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
   if (fit.ok()) examine(run, cut, fit, other);
-  FittedMotion motion;
-  if (!interrupted() && before.simulation.ok()) motion = fitted_motion(run, needed, data, fit);
+  const Problem explained = with_fitted_values(needed, fit);
+  std::optional<SimulatedExperiment> after;
+  if (!interrupted() && before.simulation.ok()) after = simulated_experiment(run, simulated_scene(explained, data));
+  run.progress.finish();
   if (fit.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped(fmt::format("optimized.json holds the {} so far", kept));
   } else if (!fit.ok()) {
     long_run.failed(fit.status, fit.message);
     if (other) run.warn("--compare: is skipped, since the fit did not converge");
   }
-  run.write("report.html", report_of(run, cut, before, start, motion, fit, history));
+  run.write("report.html", report_of(run, cut, start, before, explained, after, fit, history));
   return long_run.finish();
 }
 
