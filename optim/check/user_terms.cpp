@@ -108,10 +108,8 @@ class UserTerms {
   }
 
  private:
-  Mechanism mechanism_at(const VectorXd& rho) const {
-    // Every parameter is active: named forces have derivatives in their parameters.
-    return Mechanism(scene_, rho, {}, user_forces_);
-  }
+  // Every parameter is active: named forces have derivatives in their parameters.
+  Mechanism mechanism_at(const VectorXd& rho) const { return Mechanism(scene_, rho, {}, user_forces_); }
 
   // Reports the worst wrong entry of a derivative along one direction, once for each `what`.
   void compare(const std::string& what, const std::string& along, double t, double step,
@@ -139,8 +137,36 @@ class UserTerms {
     const double size = d.of_rates ? speed_ : length_;
     return kLargest / moved * (d.turns ? size / length_ : size);
   }
-  double step_of_parameter(std::size_t k) const {
-    return kLargest * typical_size(scene_.parameters[k], rho_(static_cast<Index>(k)));
+
+  // A value along the motion, and the names of its derivatives.
+  struct Term {
+    std::string f_q, f_v, f_rho;
+    std::function<VectorXd(const Mechanism& there, const VectorXd& rho, const VectorXd& q, const VectorXd& v)> f;
+  };
+
+  void compare_all(const Term& term, double t, const VectorXd& q, const VectorXd& v,
+                   const std::vector<std::string>& bodies, const MatrixXd& f_q, const MatrixXd& f_v,
+                   const MatrixXd& f_rho) {
+    std::vector<std::string> names{term.f_v};
+    if (term.f_q != term.f_v) names.push_back(term.f_q);  // after f_v, which turns use, too
+    const std::vector<Direction> all = directions(q, v, bodies);
+    for (const std::string& name : names)
+      for (const Direction& d : all)
+        if (name == (d.of_rates ? term.f_v : term.f_q))
+          compare(
+              name, d.name, t, step_of(d), [&](double h) { return term.f(mechanism_, rho_, q + h * d.q, v + h * d.v); },
+              f_q * d.q + f_v * d.v);
+    for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
+      const Index column = static_cast<Index>(k);
+      compare(
+          term.f_rho, "'" + scene_.parameters[k].name + "'", t,
+          kLargest * typical_size(scene_.parameters[k], rho_(column)),
+          [&](double h) {
+            const VectorXd rho = rho_ + h * VectorXd::Unit(rho_.size(), column);
+            return term.f(mechanism_at(rho), rho, q, v);
+          },
+          f_rho.col(column));
+    }
   }
 
   void check_force(std::size_t index, double t, const VectorXd& y) {
@@ -155,70 +181,43 @@ class UserTerms {
       const Index at = own.q(++number);
       q.segment<7>(at) = y.segment<7>(whole.q(body)), v.segment<7>(at) = y.segment<7>(whole.v(body));
     }
-    const std::string name = fmt::format("{} (on '{}')", force.name(), fmt::join(bodies, "', '"));
-    const auto Q = [&](const BoundForce& of, const VectorXd& q_at, const VectorXd& v_at, const VectorXd& rho) {
+    const std::string name = fmt::format("{} (on '{}'): its ", force.name(), fmt::join(bodies, "', '"));
+    const auto Q = [&](const Mechanism& there, const VectorXd& rho, const VectorXd& q_at, const VectorXd& v_at) {
       VectorXd value = VectorXd::Zero(size);
-      of.Q(t, q_at, v_at, rho, value);
+      there.data().user_forces[index].force->Q(t, q_at, v_at, rho, value);
       return value;
     };
     MatrixXd K = MatrixXd::Zero(size, size), C = K, Q_rho = MatrixXd::Zero(size, rho_.size());
     force.K(t, q, v, rho_, K), force.C(t, q, v, rho_, C), force.Q_rho(t, q, v, rho_, Q_rho);
-    const std::vector<Direction> all = directions(q, v, bodies);
-    for (const bool rates : {true, false})  // turns use C, too
-      for (const Direction& d : all)
-        if (d.of_rates == rates)
-          compare(
-              name + (rates ? ": its C = -dQ/dv" : ": its K = -dQ/dq"), d.name, t, step_of(d),
-              [&](double h) { return Q(force, q + h * d.q, v + h * d.v, rho_); }, -(K * d.q + C * d.v));
-    for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
-      const VectorXd e = VectorXd::Unit(rho_.size(), static_cast<Index>(k));
-      compare(
-          name + ": its Q_rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
-          [&](double h) {
-            const Mechanism there = mechanism_at(rho_ + h * e);
-            return Q(*there.data().user_forces[index].force, q, v, rho_ + h * e);
-          },
-          Q_rho.col(static_cast<Index>(k)));
-    }
-    if (const InertialLoad* inertia = force.inertia()) check_inertia(index, *inertia, name, t, q, v, bodies);
+    compare_all({name + "K = -dQ/dq", name + "C = -dQ/dv", name + "Q_rho", Q}, t, q, v, bodies, -K, -C, Q_rho);
+    if (force.inertia()) check_inertia(index, name, t, q, v, bodies);
   }
 
   // The accelerations have the size that moves the body by its length within a second.
-  void check_inertia(std::size_t index, const InertialLoad& load, const std::string& name, double t, const VectorXd& q,
-                     const VectorXd& v, const std::vector<std::string>& bodies) {
+  void check_inertia(std::size_t index, const std::string& name, double t, const VectorXd& q, const VectorXd& v,
+                     const std::vector<std::string>& bodies) {
     VectorXd z(6);
     z << length_ * Vector3d(1, -0.7, 0.4), Vector3d(0.6, -1, 0.8);
-    const auto L = [&](const InertialLoad& of, const VectorXd& q_at, const VectorXd& v_at, const VectorXd& z_at,
-                       const VectorXd& rho) {
+    const auto load_of = [&](const Mechanism& there) -> const InertialLoad& {
+      return *there.data().user_forces[index].force->inertia();
+    };
+    const auto L = [&](const Mechanism& there, const VectorXd& rho, const VectorXd& q_at, const VectorXd& v_at,
+                       const VectorXd& z_at) {
       VectorXd value = VectorXd::Zero(6);
-      of.L(q_at, v_at, z_at, rho, value);
+      load_of(there).L(q_at, v_at, z_at, rho, value);
       return value;
     };
+    const InertialLoad& load = load_of(mechanism_);
     MatrixXd M = MatrixXd::Zero(6, 6), L_q = MatrixXd::Zero(6, 7), L_v = L_q, L_rho = MatrixXd::Zero(6, rho_.size());
     load.M(q, rho_, M), load.L_q(q, v, z, rho_, L_q), load.L_v(q, v, z, rho_, L_v), load.L_rho(q, v, z, rho_, L_rho);
-    for (Index k = 0; k < 6; ++k) {
-      const VectorXd e = VectorXd::Unit(6, k);
+    for (Index k = 0; k < 6; ++k)
       compare(
-          name + ": its M = -dL/dz", fmt::format("acceleration {}", k), t, kLargest * (k < 3 ? length_ : 1),
-          [&](double h) { return L(load, q, v, z + h * e, rho_); }, -M.col(k));
-    }
-    const std::vector<Direction> all = directions(q, v, bodies);
-    for (const bool rates : {true, false})
-      for (const Direction& d : all)
-        if (d.of_rates == rates)
-          compare(
-              name + (rates ? ": its L_v" : ": its L_q"), d.name, t, step_of(d),
-              [&](double h) { return L(load, q + h * d.q, v + h * d.v, z, rho_); }, L_q * d.q + L_v * d.v);
-    for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
-      const VectorXd e = VectorXd::Unit(rho_.size(), static_cast<Index>(k));
-      compare(
-          name + ": its L_rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
-          [&](double h) {
-            const Mechanism there = mechanism_at(rho_ + h * e);
-            return L(*there.data().user_forces[index].force, q, v, z, rho_ + h * e);
-          },
-          L_rho.col(static_cast<Index>(k)));
-    }
+          name + "M = -dL/dz", fmt::format("acceleration {}", k), t, kLargest * (k < 3 ? length_ : 1),
+          [&](double h) { return L(mechanism_, rho_, q, v, z + h * VectorXd::Unit(6, k)); }, -M.col(k));
+    const auto at_z = [&](const Mechanism& there, const VectorXd& rho, const VectorXd& q_at, const VectorXd& v_at) {
+      return L(there, rho, q_at, v_at, z);
+    };
+    compare_all({name + "L_q", name + "L_v", name + "L_rho", at_z}, t, q, v, bodies, L_q, L_v, L_rho);
   }
 
   // Checks the derivatives, up to the third, of functions written in C++ that the law calls. Gradients read these.
@@ -241,15 +240,14 @@ class UserTerms {
 
   void check_objective(const Objective& objective, double t, const VectorXd& y, const VectorXd& angles, bool end) {
     const Cost cost = objective.cost(mechanism_);
-    const std::string name = "objective '" + objective.name() + "': ";
+    const std::string name = "objective '" + objective.name() + "': its ";
     if (cost.running)
       check_cost(
-          name + "its running cost's", *cost.running, [&](const Mechanism& m) { return objective.cost(m).running; }, t,
-          y, angles);
+          name + "running", *cost.running, [&](const Mechanism& m) { return objective.cost(m).running; }, t, y, angles);
     if (cost.terminal && end)
       check_cost(
-          name + "its terminal cost's", *cost.terminal, [&](const Mechanism& m) { return objective.cost(m).terminal; },
-          t, y, angles);
+          name + "terminal", *cost.terminal, [&](const Mechanism& m) { return objective.cost(m).terminal; }, t, y,
+          angles);
   }
 
   template <class Bound>
@@ -260,28 +258,15 @@ class UserTerms {
     for (const Body& body : scene_.bodies) bodies.push_back(body.name);
     VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(rho_.size());
     cost.add_gradient({t, y, angles}, 1, y_bar, rho_bar);
-    const auto one = [](double x) { return VectorXd::Constant(1, x); };
-    for (const Direction& d : directions(y.head(n), y.tail(n), bodies)) {
-      VectorXd along(y.size());
-      along << d.q, d.v;
-      compare(
-          name + " gradient in y", d.name, t, step_of(d),
-          [&](double h) {
-            const VectorXd there = y + h * along;
-            return one(cost.value({t, there, angles}));
-          },
-          one(y_bar.dot(along)));
-    }
-    for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
-      compare(
-          name + " gradient in rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
-          [&](double h) {
-            VectorXd rho = rho_;
-            rho(static_cast<Index>(k)) += h;
-            return one(bound(mechanism_at(rho))->value({t, y, angles}));
-          },
-          one(rho_bar(static_cast<Index>(k))));
-    }
+    const auto f = [&](const Mechanism& there, const VectorXd&, const VectorXd& q, const VectorXd& v) {
+      VectorXd y_there(y.size());
+      y_there << q, v;
+      return VectorXd::Constant(
+          1, &there == &mechanism_ ? cost.value({t, y_there, angles}) : bound(there)->value({t, y_there, angles}));
+    };
+    const std::string in_y = name + " cost's gradient in y", in_rho = name + " cost's gradient in rho";
+    compare_all({in_y, in_y, in_rho, f}, t, y.head(n), y.tail(n), bodies, y_bar.head(n).transpose(),
+                y_bar.tail(n).transpose(), rho_bar.transpose());
   }
 
   const Scene& scene_;
