@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/linear/fixed_size.hpp"
+#include "core/linear/dual_numbers.hpp"
 
 namespace mbsopt {
 
@@ -32,6 +32,14 @@ EIGEN_ALWAYS_INLINE auto length(const Jet<V>& d) {
   if (!(l2 > 0)) return Jet<T>{T(0), T(0), T(0)};
   const T l = sqrt(l2), ldot = dot(d.x, d.xd) / l;
   return Jet<T>{l, ldot, T((dot(d.x, d.xdd) + dot(d.xd, d.xd) - ldot * ldot) / l)};
+}
+
+// atan2(y, x). Eigen's function of dual numbers allocates.
+inline double angle_of(double y, double x) { return std::atan2(y, x); }
+template <int N>
+DualNumber<N> angle_of(const DualNumber<N>& y, const DualNumber<N>& x) {
+  const double squares = x.value() * x.value() + y.value() * y.value();
+  return {std::atan2(y.value(), x.value()), (x.value() * y.derivatives() - y.value() * x.derivatives()) / squares};
 }
 
 // d/l, or zero without a direction.

@@ -20,7 +20,7 @@ EIGEN_ALWAYS_INLINE Row<VectorOf<F>> row_of(const Angle&, const F& f1, const F& 
   const Jet<T>&C = cosine.phi, &S = sine.phi;
   const T D = C.x * C.x + S.x * S.x, rate = (C.x * S.xd - S.x * C.xd) / D, c = C.x / D, s = S.x / D;
   T phi(0);
-  if constexpr (!std::is_same_v<T, double>) phi = atan2(S.x, C.x);
+  if constexpr (!std::is_same_v<T, double>) phi = angle_of(S.x, C.x);
   return {{phi, rate, T(c * S.xdd - s * C.xdd - 2 * (c * C.xd + s * S.xd) * rate)},
           {},
           c * sine.moment1 - s * cosine.moment1,

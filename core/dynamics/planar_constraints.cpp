@@ -37,10 +37,9 @@ Jet<Complex<T>> separation(const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, c
 // arg(A2 s2) - arg(A1 s1). It computes only the given order, because atan2 is slow.
 template <class T, class S>
 Jet<T> angle_between(Order order, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
-  using std::atan2;
   if (order == Order::phi) {
     const Complex<T> x1 = f1.A * s.s1, x2 = f2.A * s.s2;
-    return {T(atan2(cross(x1, x2), dot(x1, x2))), T(0), T(0)};
+    return {angle_of(T(cross(x1, x2)), T(dot(x1, x2))), T(0), T(0)};
   }
   const Complex<T> over1 = inverse(f1.A), rate1 = f1.Adot * over1, over2 = inverse(f2.A), rate2 = f2.Adot * over2;
   return {T(0), T(rate2.im - rate1.im),
