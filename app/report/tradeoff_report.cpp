@@ -32,7 +32,7 @@ void add_reference(HtmlPage& page, const Json& result, const TradeoffReference& 
                                fmt::join(others.get<std::vector<std::string>>(), ", ")));
 }
 
-// What a plot shows: the curves of a quantity for one group of methods.
+// A plot shows the curves of a quantity for one group of methods.
 constexpr std::string_view kExplicit = "explicit methods", kImplicit = "implicit and multistep methods",
                            kFormulation = "formulations", kGradient = "gradient methods";
 

@@ -21,7 +21,7 @@ Json columns_of(const PenaltyStudyRow& row, const PenaltyStudy& study);
 std::string to_csv(const Tradeoff& tradeoff);
 std::string to_csv(const PenaltyStudy& study);
 
-// What a row of a penalty study holds: errors of accelerations, and two runs.
+// A row of a penalty study holds errors of accelerations, and two runs.
 struct AccelerationError {
   const char *column, *words, *legend;  // legend: in plots
   double PenaltyStudyRow::*value;

@@ -59,7 +59,7 @@ EIGEN_ALWAYS_INLINE Row<VectorOf<F>> product_row(const F& f1, const F& f2, const
   const Jet<VectorOf<F>> x = turned(f1, s1), y = turned(f2, s2);
   return {product(x, y), {}, moment(f1, s1, y.x), moment(f2, s2, x.x)};
 }
-// Of a displacement as the frames have it.
+// Returns the change of a row for the virtual displacements that the frames hold.
 inline double virtual_change(const Row<Vector3d>& row, const Frame& f1, const Frame& f2) {
   return row.moment1.dot(f1.theta_eta) + row.moment2.dot(f2.theta_eta);
 }

@@ -1,4 +1,4 @@
-// What the primitives of a single row share. Each has one formula for its row (in its .cpp file), which is a template:
+// The primitives of a single row share this base. Each has one formula for its row (in its .cpp file), a template:
 //
 //   row_of(p, f1, f2, s)   Phi with its time derivatives, and J': the moments, and the force on body 2, which is the
 //                          opposite of that on body 1

@@ -18,7 +18,7 @@ namespace {
 // The same as for the rank of a fit, statistics.cpp: exact derivatives of a simulation carry errors of about 1e-12.
 constexpr double kRankTolerance = 1e-8;
 
-// What the experiments tell of the shared variables: |T d + p| is to be small.
+// The experiments tell this of the shared variables: |T d + p| is to be small.
 struct SharedRows {
   MatrixXd T_p;                     // [T | p]
   std::vector<std::size_t> member;  // of each row; that of priors is none

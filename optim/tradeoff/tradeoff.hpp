@@ -32,12 +32,11 @@ Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& obje
 // such rounding. docs/formulations.md.
 struct PenaltyStudyRow {
   double alpha = 0;
-  // Of accelerations at states of the right motion: the largest relative errors (of the largest entry). NaN: they
-  // cannot be computed.
-  double model_error = 0;     // penalty (quasi-definite) against the constrained equations
-  double rounding_error = 0;  // penalty by Cholesky against quasi-definite
-  double augmented_error =
-      0;  // augmented Lagrangian at this relative alpha, three refinements, against the constrained
+  // These are the largest relative errors (of the largest entry) of accelerations at states of the right motion. They
+  // are NaN if they cannot be computed. The last one is that of three refinements at this relative alpha.
+  double model_error = 0;                       // penalty (quasi-definite) against the constrained equations
+  double rounding_error = 0;                    // penalty by Cholesky against quasi-definite
+  double augmented_error = 0;                   // augmented Lagrangian against the constrained equations
   std::size_t quasidefinite = 0, cholesky = 0;  // rows of the table
   // Per quantity what Cholesky adds on the very steps of the quasi-definite run; NaN where that run failed.
   Eigen::VectorXd rounding;
