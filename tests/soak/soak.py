@@ -33,8 +33,6 @@ CHECKS = [(checks.sweeps, 1), (checks.plane, 1), (checks.energy, 1), (checks.kin
           (checks.integrators, 2), (checks.differences, 2), (checks.tilt, 2), (checks.rounded, 2), (checks.order, 4),
           (checks.again, 20), (checks.brief, 1), (checks.loose_bounds, 20), (checks.interrupted, 25),
           (checks.own_check, 15), (checks.other_commands, 10), (oracle.agrees, 50)]
-# These try a command, for which any scene will do: replays of several scenes ask them of the first one.
-OF_COMMANDS = (checks.loose_bounds, checks.interrupted)
 
 
 def examine(scene, program, chosen, folder):
@@ -99,12 +97,11 @@ def say(failures, name, about):
 
 def replay(options):
     held = 0
-    for k, file in enumerate(options.replay):
+    for file in options.replay:
         with tempfile.TemporaryDirectory(prefix="soak_", dir=options.scratch) as folder:
             scene = load(file)
             program = Program(options.program, options.patience)
-            chosen = [check for check, _ in CHECKS if k == 0 or check not in OF_COMMANDS]
-            by_check, told = examine(scene, program, chosen, folder)
+            by_check, told = examine(scene, program, [check for check, _ in CHECKS], folder)
             failures = [failure for found in by_check.values() for failure in found]
             say(failures, file, scene.about)
             if told["refused"]:
