@@ -54,9 +54,12 @@ SaddleSettings constrained(const MechanismData& data, const FormulationSettings&
 SaddleSettings saddle_settings(const MechanismData& data, const FormulationSettings& settings) {
   if (settings.type == FormulationType::augmented_lagrangian) return constrained(data, settings);
   const bool moderate = settings.linear_solver == LinearSolver::quasidefinite;
-  const Refinements refinements = moderate ? Refinements{2, 50, 1e-15} : Refinements{};
-  const double alpha = moderate ? moderate_alpha(data, settings.alpha) : settings.alpha;
-  return {Eigen::VectorXd::Constant(data.m, alpha), 1 / settings.alpha, refinements, refinements};
+  const double alpha = moderate ? moderate_alpha(data, settings.alpha) : settings.alpha,
+               compliance = 1 / settings.alpha;
+  const Eigen::VectorXd alphas = Eigen::VectorXd::Constant(data.m, alpha);
+  if (moderate) return {alphas, compliance, {2, 50, 1e-15}, {2, 50, 1e-15}};
+  // In derivatives, one pass removes the rounding of S, which would separate tangent and adjoint.
+  return {alphas, compliance, {}, {1, 1, 0}};
 }
 
 }  // namespace mbsopt
