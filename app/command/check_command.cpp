@@ -1,15 +1,18 @@
+// Compares all gradient methods, for the terminal, the report and result.json.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
+#include <string_view>
+#include <utility>
 
-#include "app/report/run_report.hpp"
+#include "app/report/run_page.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/run/command.hpp"
-#include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/check/gradient_check.hpp"
 #include "optim/objective/objective_run.hpp"
@@ -17,6 +20,8 @@
 
 namespace mbsopt::inline app {
 namespace {
+
+constexpr std::string_view kFrozen = "fd_frozen";  // the key of differences on frozen steps
 
 struct ComparedMethod {
   const char* key;   // in result.json
@@ -33,32 +38,40 @@ std::vector<ComparedMethod> compared_methods(const GradientCheck& check) {
   return methods;
 }
 
-// "agrees 3.1e-14": the verdict, and its relative difference.
-std::string compared(Verdict verdict, double difference) {
-  const std::string words(to_string(verdict));
-  return std::isfinite(difference) && verdict != Verdict::zero ? fmt::format("{} {:.1e}", words, difference) : words;
+// "agrees 3.1e-14": the verdict, "-" if there is none, and its relative difference.
+std::string compared(std::string_view verdict, double difference) {
+  const bool has_size = std::isfinite(difference) && verdict != "-" && verdict != to_string(Verdict::zero);
+  return has_size ? fmt::format("{} {:.1e}", verdict, difference) : std::string(verdict);
 }
 
-std::string derivative(double value) { return std::isfinite(value) ? significant(value, 11) : "failed"; }
-
-void print_entries(std::ostream& out, const GradientCheck& check, const ObjectiveUnits& units,
-                   const std::vector<std::optional<double>>& true_values) {
-  out << (check.discrete ? "\nfrozen: differences on the steps of the base run; free: with step-size control at work. "
-                           "Relative to tlm:\n"
-                         : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
-                           "frozen. Relative to tlm:\n");
-  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
-    out << '\n' << objective_line(check.objectives[i], check.psi(static_cast<Eigen::Index>(i)), true_values[i], units);
+// All derivatives of each objective, and how they compare.
+void show_entries(RunPage& page, bool discrete) {
+  const Json& result = page.run.result;
+  std::ostream& out = page.run.context.out;
+  page.heading("Verdicts");
+  out << (discrete ? "\nfrozen: differences on the steps of the base run; free: with step-size control at work. "
+                     "Relative to tlm:\n"
+                   : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
+                     "frozen. Relative to tlm:\n");
+  for (const auto& [objective, entries] : result.at("verdict").at("entries").items()) {
     TextTable table(
         {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
-    for (const CheckedEntry& e : check.entries) {
-      if (e.objective != check.objectives[i]) continue;
-      table.add({e.parameter, derivative(e.adjoint), derivative(e.tlm), e.frozen_verdict ? derivative(e.frozen) : "-",
-                 derivative(e.free), compared(e.exact, e.tlm_adjoint),
-                 e.frozen_verdict ? compared(*e.frozen_verdict, e.frozen_difference) : "-",
-                 e.free_verdict ? compared(*e.free_verdict, e.free_difference) : "-"});
+    for (const auto& [parameter, entry] : entries.items()) {
+      TableRow& row = table.add({parameter});
+      for (const char* method : {"adjoint", "tlm", "fd_frozen", "fd_free"}) {
+        const bool known = result["methods"].contains(method) && (method != kFrozen || !entry.at("frozen").is_null());
+        const Json value = known ? result["methods"][method]["gradient"][objective][parameter] : Json();
+        const bool failed = known && !std::isfinite(value.get<double>());
+        row.push_back(failed ? "failed" : known ? number_cell(value, 11) : "-");
+      }
+      for (const auto& [verdict, difference] :
+           {std::pair{"exact", "tlm_adjoint"}, {"frozen", "frozen_difference"}, {"free", "free_difference"}})
+        row.push_back(compared(cell(entry.at(verdict)), number_of(entry, difference)));
     }
-    out << table.text();
+    const std::string value = objective_line(objective, result["objectives"][objective]);
+    out << '\n' << value << table.text();
+    page.paragraph(value);
+    page.table(table);
   }
 }
 
@@ -105,7 +118,8 @@ void print_continuous(std::ostream& out, const GradientCheck& check) {
   out << fmt::format("\n{} by {}, of the differential equation, against the derivatives of {}, both at rtol {:g}:\n",
                      c.method, c.integrator, c.discrete, c.rtol);
   for (const std::string& objective : check.objectives) {
-    out << fmt::format("  {}: {}\n", objective, compared(c.worst_verdict(objective), c.worst_difference(objective)));
+    out << fmt::format("  {}: {}\n", objective,
+                       compared(to_string(c.worst_verdict(objective)), c.worst_difference(objective)));
   }
 }
 
@@ -192,6 +206,141 @@ void add_to_result(Json& result, const GradientCheck& check, const std::vector<s
   }
 }
 
+std::vector<double> numbers_of(const Json& array) {
+  std::vector<double> numbers;
+  for (const Json& x : array) numbers.push_back(x.is_number() ? x.get<double>() : NAN);
+  return numbers;
+}
+
+// Adds the series if a logarithmic axis can show any of it.
+void add_positive(LinePlot& plot, PlotSeries series) {
+  if (std::ranges::any_of(series.y, [](double y) { return y > 0; })) plot.series.push_back(std::move(series));
+}
+
+// |central difference - tangent-linear model| over the step h, per kind of steps.
+LinePlot ladder_plot(const std::string& objective, const std::string& unit, const Parameter& parameter,
+                     const Json& entry, double derivative) {
+  const std::string step = parameter.unit.empty() ? kUnknownUnit : parameter.unit;
+  LinePlot plot{.title = fmt::format("d {}/d {}: differences over their step", objective, parameter.name),
+                .x_label = fmt::format("step h of {} [{}]", parameter.name, step),
+                .y_label = fmt::format("|difference - derivative| [{}]", unit_per(unit, step)),
+                .logarithmic_y = true,
+                .logarithmic_x = true};
+  for (const auto& [key, name] :
+       {std::pair("frozen", "on frozen steps"), std::pair("free", "with step-size control")}) {
+    std::vector<double> errors = numbers_of(entry.at("ladder").at(key));
+    for (double& y : errors) y = std::abs(y - derivative);
+    add_positive(plot, {name, numbers_of(entry.at("ladder").at("h")), errors});
+  }
+  return plot;
+}
+
+constexpr std::size_t kMostLadders = 60;  // plots of a page that stays below 400 kB
+
+// The entry of result["verdict"]["entries"] for one objective and one parameter.
+struct CheckedPair {
+  std::string objective, parameter;
+  const Json& entry;
+};
+
+std::string ladder_id(std::size_t pair) { return fmt::format("ladder-{}", pair); }  // for links
+
+void add_ladders(RunPage& page, const std::vector<CheckedPair>& pairs) {
+  const Scene& scene = page.run.problem.scene;
+  page.heading("Differences over their step");
+  page.note("Errors fall as h^2 until rounding, or the integrator's error on free steps, takes over as 1/h.");
+  page.begin_choices({"objective", "parameter"});
+  for (std::size_t k = 0; k < std::min(pairs.size(), kMostLadders); ++k) {
+    const auto& [objective, parameter, entry] = pairs[k];
+    const Json& values = page.run.result.at("objectives").at(objective);
+    const double derivative = number_of(values.at("gradient"), parameter);
+    const auto found = std::ranges::find(scene.parameters, parameter, &Parameter::name);
+    if (std::isnan(derivative) || found == scene.parameters.end()) continue;
+    page.begin_choice({objective, parameter}, ladder_id(k));
+    page.plot(ladder_plot(objective, unit_of(values), *found, entry, derivative));
+    page.end_choice();
+  }
+  page.end_choices();
+  if (pairs.size() > kMostLadders)
+    page.note(fmt::format("The first {} of {} plots are drawn.", kMostLadders, pairs.size()));
+}
+
+void add_taylor(RunPage& page) {
+  const Json& objectives = page.run.result.at("objectives");
+  const Json taylor = page.run.result.at("verdict").value("taylor", Json::object());
+  std::set<std::string> units;
+  for (const auto& [objective, of_one] : taylor.items()) units.insert(unit_of(objectives.at(objective)));
+  LinePlot plot{.title = "Taylor remainder along a random direction d of all parameters",
+                .x_label = "h [-]",
+                .y_label = fmt::format("|psi(rho + h d) - psi - h psi_rho d| [{}]",
+                                       units.size() == 1 ? *units.begin() : kUnknownUnit),
+                .logarithmic_y = true,
+                .logarithmic_x = true};
+  for (const auto& [objective, of_one] : taylor.items()) {
+    const Json slope = of_one.value("slope", Json());
+    add_positive(plot, {slope.is_number() ? fmt::format("{}: h^{:.2f}", objective, slope.get<double>()) : objective,
+                        numbers_of(of_one.at("h")), numbers_of(of_one.at("remainder"))});
+  }
+  if (plot.series.empty()) return;
+  page.heading("Taylor remainder");
+  page.plot(plot);
+}
+
+// The number of equal digits of two numbers, from their relative difference.
+void add_digits(HtmlPage& page, const std::vector<CheckedPair>& pairs, const char* difference,
+                const std::string& title) {
+  constexpr double kDouble = 16;  // digits of a double
+  std::vector<std::string> header{"objective"};
+  std::vector<TableRow> rows;
+  bool any = false;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const auto& [objective, parameter, entry] = pairs[k];
+    if (rows.empty() || rows.back().front().text != objective) rows.push_back({objective});
+    if (rows.size() == 1) header.push_back(parameter);
+    TableCell& shown = rows.back().emplace_back("-");
+    const double found = number_of(entry, difference);
+    if (std::isnan(found)) continue;
+    const double digits = std::clamp(-std::log10(std::max(found, 1e-300)), 0.0, kDouble);
+    any = true;
+    shown = TableCell(fmt::format("{:.0f}", digits), cell(found, 3));
+    shown.shade = digits / kDouble;
+    if (k < kMostLadders) shown.link = "#" + ladder_id(k);
+  }
+  if (!any) return;
+  page.paragraph(title);
+  page.table(header, rows);
+}
+
+std::string worst(const std::vector<CheckedPair>& pairs, const char* difference) {
+  double largest = 0;
+  for (const CheckedPair& pair : pairs)
+    if (const double found = number_of(pair.entry, difference); std::isfinite(found))
+      largest = std::max(largest, found);
+  return fmt::format("{:.1e}", largest);
+}
+
+// The comparison as colours and curves.
+void add_plots(RunPage& page) {
+  const Json& verdict = page.run.result.at("verdict");
+  std::vector<CheckedPair> pairs;
+  for (const auto& [objective, parameters] : verdict.at("entries").items())
+    for (const auto& [parameter, entry] : parameters.items()) pairs.push_back({objective, parameter, entry});
+  page.verdict(
+      fmt::format("{}: tangent-linear model and adjoint differ by at most {}, differences on frozen steps by {}, "
+                  "on free steps by {} of an entry.",
+                  verdict.at("passed").get<bool>() ? "All gradients agree" : "Gradients disagree",
+                  worst(pairs, "tlm_adjoint"), worst(pairs, "frozen_difference"), worst(pairs, "free_difference")));
+  page.heading("Digits that agree");
+  page.note(
+      "A stronger colour means more agreeing digits, 16 at most. The pointer shows the relative difference; a click "
+      "shows the differences over their step.");
+  add_digits(page, pairs, "tlm_adjoint", "Tangent-linear model and adjoint:");
+  add_digits(page, pairs, "frozen_difference", "Tangent-linear model and differences on frozen steps:");
+  add_digits(page, pairs, "free_difference", "Tangent-linear model and differences with step-size control:");
+  add_ladders(page, pairs);
+  add_taylor(page);
+}
+
 }  // namespace
 
 int check_command(const CommandContext& context) {
@@ -226,11 +375,12 @@ int check_command(const CommandContext& context) {
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);
   run.warn(missed_peaks(evaluator.objectives(), check.psi, true_values));
-  const ObjectiveUnits units = objective_units(run.problem);
-  add_units(run.result, units);
+  add_units(run.result, objective_units(run.problem));
   print_simulation(context.out, scene, check.statistics);
   warn_of_stiffness(run, check.statistics, true);
-  print_entries(context.out, check, units, true_values);
+  RunPage page(run);
+  add_plots(page);
+  show_entries(page, check.discrete);
   print_taylor(context.out, check);
   print_identities(context.out, check);
   print_continuous(context.out, check);
@@ -240,7 +390,10 @@ int check_command(const CommandContext& context) {
   context.out << fmt::format("\n{}\n", check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
   const bool cases_agree = check_cases(run);
   if (!check.passed() || !cases_agree) run.disagrees();
-  run.write("report.html", check_report(scene, run.result));
+  add_gradients(page);
+  add_objectives(page);
+  add_simulation(page, scene);
+  page.write();
   return run.finish();
 }
 

@@ -1,72 +1,27 @@
+// Optimises the problem. Its result goes to result.json, and with tables and plots to the terminal and the report.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "app/report/report_parts.hpp"
-#include "app/report/run_report.hpp"
+#include "app/report/motion_plots.hpp"
+#include "app/report/row_plot.hpp"
+#include "app/report/run_page.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/simulated_motion.hpp"
 #include "app/run/command.hpp"
-#include "app/run/run.hpp"
 #include "app/starts/design_starts.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
 
 namespace mbsopt::inline app {
 namespace {
-
-void print_design(std::ostream& out, const DesignResult& design, const ObjectiveUnits& units,
-                  const std::string& effort) {
-  TextTable parameters({"parameter", "initial", end_of_search(to_string(design.status)), "unit", "at bound"});
-  for (const DesignVariable& v : design.variables) {
-    parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
-                    bound_hit(v.at_lower, v.at_upper)});
-  }
-  TextTable objectives({"objective", "unit", "before", "after", "true extreme", "at least", "at most", "price"});
-  const auto add = [&](const std::string& name, const std::string& objective, const auto& of,
-                       const std::vector<std::string>& limits) {
-    std::vector<std::string> cells{name, shown_unit(units, objective), significant(of.initial), significant(of.value),
-                                   or_blank(of.true_value)};
-    cells.insert(cells.end(), limits.begin(), limits.end());
-    objectives.add(std::move(cells));
-  };
-  add(design.objective, design.objective,
-      DesignCase{"", 1, design.objective_initial, design.objective_final, design.objective_true}, {});
-  for (const DesignCase& c : design.cases)
-    add(fmt::format("{} ({})", design.objective, c.name), design.objective, c, {});
-  for (const DesignConstraint& c : design.constraints)
-    add(c.in_words(), c.objective, c, {or_blank(c.lower), or_blank(c.upper), c.price != 0 ? significant(c.price) : ""});
-  std::vector<std::string> unless_empty{"true extreme"};
-  if (design.constraints.empty()) unless_empty.insert(unless_empty.end(), {"at least", "at most", "price"});
-  out << '\n' << parameters.text() << '\n' << objectives.text(unless_empty);
-  out << fmt::format("\n{} {}: {}, {}, {}{}\n", design.optimizer, to_string(design.status),
-                     counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"), effort,
-                     design.seed ? fmt::format(", seed {}", *design.seed) : "");
-  if (std::isfinite(design.optimality))
-    out << fmt::format(
-        "optimality {:.1e}, infeasibility {:.1e} at the solution{}\n", design.optimality, design.violation,
-        design.true_violation > design.violation ? fmt::format(", {:.1e} of true extremes", design.true_violation)
-                                                 : "");
-  if (std::any_of(design.constraints.begin(), design.constraints.end(),
-                  [](const DesignConstraint& c) { return c.price != 0; }))
-    out << fmt::format("price: decrease of '{}' per unit by which the limit is relaxed\n", design.objective);
-  if (design.limit_rounds > 0)
-    out << fmt::format("{} to make limits hold for true extremes\n", counted(design.limit_rounds, "further round"));
-  if (design.conflicts.empty()) return;
-  TextTable conflicts({"limit in conflict", "missed by", "price"});
-  for (const DesignConflict& c : design.conflicts)
-    conflicts.add({c.limit, c.missed > 0 ? significant(c.missed) : "", significant(c.price)});
-  out << '\n'
-      << conflicts.text()
-      << "price: decrease of the sum of relative violations per unit by which the limit is relaxed\n";
-}
 
 void add_to_result(Json& result, const DesignResult& design) {
   result["simulation"] = to_json(design.final_evaluation.statistics);
@@ -79,45 +34,124 @@ void add_to_result(Json& result, const DesignResult& design) {
   }
   for (const DesignConstraint& c : design.constraints) {
     Json& objectives = c.load_case.empty() ? result["objectives"] : result["cases"][c.load_case]["objectives"];
-    objectives[c.objective] = {{"value", c.value},
-                               {"initial", c.initial},
-                               {"lower", or_null(c.lower)},
-                               {"upper", or_null(c.upper)},
-                               {"violation", c.violation},
-                               {"price", c.price},
-                               {"at_bound", bound_json(c.at_lower, c.at_upper)}};
-    if (!c.true_value) continue;
-    objectives[c.objective]["true_value"] = *c.true_value;
-    objectives[c.objective]["true_violation"] = c.true_violation;
+    Json& objective = objectives[c.objective];
+    objective = {{"value", c.value},
+                 {"initial", c.initial},
+                 {"lower", or_null(c.lower)},
+                 {"upper", or_null(c.upper)},
+                 {"violation", c.violation},
+                 {"price", c.price},
+                 {"at_bound", bound_json(c.at_lower, c.at_upper)}};
+    if (c.true_value) objective["true_value"] = *c.true_value, objective["true_violation"] = c.true_violation;
   }
-  for (const DesignVariable& v : design.variables) {
+  for (const DesignVariable& v : design.variables)
     result["parameters"][v.name] = {
         {"initial", v.initial},      {"value", v.value},          {"unit", v.unit},
         {"lower", or_null(v.lower)}, {"upper", or_null(v.upper)}, {"at_bound", bound_json(v.at_lower, v.at_upper)}};
-  }
-  result["optimizer"] = {{"type", design.optimizer},
-                         {"algorithm", design.algorithm},
-                         {"status", to_string(design.status)},
-                         {"message", design.message},
-                         {"gradients", design.gradient_choice},
-                         {"iterations", design.iterations},
-                         {"evaluations", design.evaluations},
-                         {"failed_evaluations", design.failed_evaluations},
-                         {"simulations", design.simulations},
-                         {"wall_seconds", design.wall_seconds},
-                         {"objective_initial", design.objective_initial},
-                         {"objective_final", design.objective_final},
-                         {"optimality", design.optimality},
-                         {"infeasibility", design.violation},
-                         {"true_infeasibility", design.true_violation}};
-  if (design.seed) result["optimizer"]["seed"] = *design.seed;
+  Json& optimizer = result["optimizer"];
+  optimizer = {{"type", design.optimizer},
+               {"algorithm", design.algorithm},
+               {"status", to_string(design.status)},
+               {"message", design.message},
+               {"gradients", design.gradient_choice},
+               {"iterations", design.iterations},
+               {"evaluations", design.evaluations},
+               {"failed_evaluations", design.failed_evaluations},
+               {"simulations", design.simulations},
+               {"wall_seconds", design.wall_seconds},
+               {"objective_initial", design.objective_initial},
+               {"objective_final", design.objective_final},
+               {"optimality", design.optimality},
+               {"infeasibility", design.violation},
+               {"true_infeasibility", design.true_violation}};
+  if (design.seed) optimizer["seed"] = *design.seed;
   if (design.status == SolverStatus::converged)
-    result["optimizer"]["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
-  if (design.mode) result["optimizer"]["assembly_mode"] = mode_json(*design.mode);
-  if (design.closing_steps > 0) result["optimizer"]["closing_steps"] = design.closing_steps;
-  if (design.limit_rounds > 0) result["optimizer"]["limit_rounds"] = design.limit_rounds;
+    optimizer["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
+  if (design.mode) optimizer["assembly_mode"] = mode_json(*design.mode);
+  if (design.closing_steps > 0) optimizer["closing_steps"] = design.closing_steps;
+  if (design.limit_rounds > 0) optimizer["limit_rounds"] = design.limit_rounds;
   for (const DesignConflict& c : design.conflicts)
     result["conflicts"].push_back({{"limit", c.limit}, {"missed", c.missed}, {"price", c.price}});
+}
+
+// "track fell from 12.3 to 0.45 m^2 s (-96 %) in 12 iterations; no limit is missed; k is at a bound."
+void add_verdict(RunPage& page, const DesignResult& design) {
+  const Json& objectives = page.run.result.at("objectives");
+  const double before = design.objective_initial, after = design.objective_final;
+  std::string words = fmt::format("{} {} from {:.5g} to {:.5g}{}", design.objective,
+                                  after < before   ? "fell"
+                                  : after > before ? "rose"
+                                                   : "stayed",
+                                  before, after, after_number(objectives.at(design.objective)));
+  if (before != 0) words += fmt::format(" ({:+.3g} %)", 100 * (after - before) / std::abs(before));
+  words += " in " + counted(design.iterations, "iteration");
+  if (objectives.size() > 1)
+    words += fmt::format("; the largest relative violation of a limit is {}", significant(design.true_violation, 2));
+  const auto at_bounds =
+      std::ranges::count_if(design.variables, [](const DesignVariable& v) { return v.at_lower || v.at_upper; });
+  page.verdict(fmt::format("{}; {} of {} at a bound.", words, at_bounds, counted(design.variables.size(), "variable")));
+}
+
+// The parameters at both ends of the search. The page draws them between their bounds, too.
+void add_parameters(RunPage& page, const DesignResult& design) {
+  const Json& parameters = page.run.result.at("parameters");
+  const char* const end = end_of_search(to_string(design.status));
+  std::vector<Column> columns{
+      {"parameter"}, {"initial", "initial", 10}, {end, "value", 10}, {"unit", "unit"}, {"at bound", "at_bound"}};
+  page.print(table_of(parameters, columns));
+  columns.insert(columns.begin() + 4, {{"lower", "lower"}, {"upper", "upper"}});
+  page.table(table_of(parameters, columns));
+  RowPlot plot{.title = fmt::format("Variables between their bounds (ring: start, dot: {})", end),
+               .x_label = kBetween,
+               .range = std::pair(-0.03, 1.03),
+               .track = true};
+  for (const auto& [name, p] : parameters.items()) {
+    const std::optional<Between> between = bounds_of(page.run.problem.scene, name, p);
+    if (!between) continue;
+    const double from = (*between)(p.at("initial").get<double>()), to = (*between)(p.at("value").get<double>());
+    plot.rows.push_back({.name = name,
+                         .low = from,
+                         .high = to,
+                         .ring = from,
+                         .dot = to,
+                         .words = cell(p.at("initial"), 4) + " \u2192 " + cell(p.at("value"), 4) + after_number(p)});
+  }
+  page.drawing(to_svg(plot));
+}
+
+// effort is the text of effort() in multistart.hpp, or the seconds.
+void show_design(RunPage& page, const DesignResult& design, const std::string& effort) {
+  std::ostream& out = page.run.context.out;
+  const Json& result = page.run.result;
+  const std::string counts = counted(design.iterations, "iteration") + ", " + counted(design.evaluations, "evaluation");
+  add_verdict(page, design);
+  page.heading("Result");
+  page.paragraph(fmt::format("{}: {}; {}.", design.optimizer, design.message, counts));
+  add_parameters(page, design);
+  page.both(table_of(objective_rows(result), {{"objective"},
+                                              {"unit", "unit"},
+                                              {"before", "initial"},
+                                              {"after", "value"},
+                                              {"true extreme", "true_value", 7, true},
+                                              {"at least", "lower", 7, true},
+                                              {"at most", "upper", 7, true},
+                                              {"margin", "margin", 3, true},
+                                              {"price", "price", 7, true}}));
+  out << fmt::format("\n{} {}: {}, {}{}\n", design.optimizer, to_string(design.status), counts, effort,
+                     design.seed ? fmt::format(", seed {}", *design.seed) : "");
+  if (std::isfinite(design.optimality))
+    out << fmt::format(
+        "optimality {:.1e}, infeasibility {:.1e} at the solution{}\n", design.optimality, design.violation,
+        design.true_violation > design.violation ? fmt::format(", {:.1e} of true extremes", design.true_violation)
+                                                 : "");
+  if (std::ranges::any_of(design.constraints, [](const DesignConstraint& c) { return c.price != 0; }))
+    page.say(fmt::format("price: decrease of '{}' per unit by which the limit is relaxed", design.objective));
+  if (design.limit_rounds > 0)
+    out << fmt::format("{} to make limits hold for true extremes\n", counted(design.limit_rounds, "further round"));
+  if (design.conflicts.empty()) return;
+  page.both(
+      table_of(result.at("conflicts"), {{"limit in conflict", "limit"}, {"missed by", "missed"}, {"price", "price"}}));
+  page.say("price: decrease of the sum of relative violations per unit by which the limit is relaxed");
 }
 
 // The bound of an extreme as a line in the plot of what it is taken of.
@@ -143,30 +177,44 @@ SensorLimits sensor_limits(const Problem& problem) {
 }
 
 // The running terms of all objectives, except those that the plot of a sensor already shows.
-std::vector<RunningTerm> running_terms(const Problem& problem, const ObjectiveUnits& units) {
-  std::vector<RunningTerm> terms;
+void add_running_terms(RunPage& page, const ObjectiveUnits& units, const SimulatedMotion& before,
+                       const SimulatedMotion& after) {
+  const Problem& problem = page.run.problem;
+  std::vector<LinePlot> plots;
   for (const ObjectiveSpec& spec : problem.objectives) {
     const std::string unit = shown_unit(units, spec.name);
-    RunningTerm term{spec.name, "Integrand of " + spec.name, fmt::format("integrand [{}]", unit_per(unit, "s"))};
+    LinePlot plot{.title = "Integrand of " + spec.name,
+                  .x_label = "t [s]",
+                  .y_label = fmt::format("integrand [{}]", unit_per(unit, "s"))};
     bool is_sensor = false;
     for (std::size_t k = 0; k < std::size(kMeanKinds); ++k) {
       if (!spec.means[k]) continue;
       const std::string text = spec.means[k]->text();
       is_sensor = std::ranges::find(problem.scene.sensors, text, &Sensor::name) != problem.scene.sensors.end();
-      term.title = fmt::format("{}: {} this over time", spec.name, kMeanKinds[k].name);
-      term.y_label = fmt::format("{} [{}]", text, unit);
+      plot.title = fmt::format("{}: {} this over time", spec.name, kMeanKinds[k].name);
+      plot.y_label = fmt::format("{} [{}]", text, unit);
       const auto bound = std::ranges::find(problem.design->subject_to, spec.name, &ObjectiveBound::objective);
-      if (bound != problem.design->subject_to.end()) term.limits = limits_of(*bound, kMeanKinds[k].extreme);
+      if (bound != problem.design->subject_to.end()) plot.limits = limits_of(*bound, kMeanKinds[k].extreme);
     }
-    if (!is_sensor) terms.push_back(std::move(term));
+    for (const SimulatedMotion* motion : {&before, &after}) {
+      const bool is_first = motion == &before;
+      std::optional<PlotSeries> series = series_of(motion->running, spec.name, is_first ? Mark::dashed : Mark::line);
+      if (!series) continue;
+      series->name = is_first ? "before" : "after";
+      plot.series.push_back(*std::move(series));
+    }
+    if (!is_sensor && std::ranges::any_of(plot.series, [](const PlotSeries& s) { return std::isfinite(s.y.front()); }))
+      plots.push_back(std::move(plot));
   }
-  return terms;
+  if (plots.empty()) return;
+  page.heading("Objectives over time");
+  for (const LinePlot& plot : plots) page.plot(plot);
 }
 
 // Omits columns that the method does not have.
 Trajectory history_of(const DesignResult& design) {
-  const bool optimality = std::all_of(design.history.begin(), design.history.end(),
-                                      [](const DesignRow& row) { return std::isfinite(row.optimality); });
+  const bool optimality = std::ranges::all_of(
+      design.history, [](double found) { return std::isfinite(found); }, &DesignRow::optimality);
   Trajectory history{{"iteration", "objective", "infeasibility"}, {}};
   if (optimality) history.columns.push_back("optimality");
   for (const DesignVariable& v : design.variables) history.columns.push_back(v.name);
@@ -177,6 +225,19 @@ Trajectory history_of(const DesignResult& design) {
     line.insert(line.end(), row.parameters.begin(), row.parameters.end());
   }
   return history;
+}
+
+void add_motions(RunPage& page, const Scene& designed, const SimulatedMotion& before, const SimulatedMotion& after) {
+  const Scene& scene = page.run.problem.scene;
+  const std::vector<PointTarget> targets = prescribed_points(page.run.problem, after.instants);
+  page.heading("Motion before and after");
+  if (!after.trajectory.rows.empty())
+    add_motion(page, {{"before", scene, before.trajectory, true},
+                      {"after", designed, after.trajectory, false, targets, after.forces}});
+  else
+    add_motion(page, {{"before", scene, before.trajectory, false, targets, before.forces}});
+  for (const LinePlot& plot : motion_plots(scene, before.trajectory, after.trajectory, sensor_limits(page.run.problem)))
+    page.plot(plot);
 }
 
 // If the linkage does not close at the values of the file, the design starts from values at which it does.
@@ -208,13 +269,14 @@ int design_command(const CommandContext& context) {
   if (!run.problem.design) throw std::invalid_argument("design: missing; it says what to minimise and what may change");
   run.start();
   if (!settle_accuracy(run)) return run.finish();
+  RunPage page(run);
   SimulatedMotion before = simulated_motion(run, parameter_values(scene));
   if (!before.simulation.ok() && !interrupted()) lead_to_closing(run, before);
   if (!before.simulation.ok()) {
     run.broke_off("nothing was designed yet", before.simulation.message, before.simulation.last_good_time);
-    run.write("report.html",
-              simulation_report(scene, run.result, before.trajectory,
-                                {.targets = prescribed_points(run.problem, before.instants), .forces = before.forces}));
+    add_simulated_motion(page, scene, before.trajectory,
+                         {.targets = prescribed_points(run.problem, before.instants), .forces = before.forces});
+    page.write();
     return run.finish();
   }
   run.result["model"] = to_json(before.model);
@@ -227,10 +289,9 @@ int design_command(const CommandContext& context) {
   add_to_result(run.result, design);
   const ObjectiveUnits units = objective_units(run.problem);
   add_units(run.result, units);
-  const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
-  print_design(
-      context.out, design, units,
-      starts ? effort(run, design.simulations, design.wall_seconds) : fmt::format("{:.3g} s", design.wall_seconds));
+  show_design(page, design,
+              run.problem.design->multistart ? effort(run, design.simulations, design.wall_seconds)
+                                             : fmt::format("{:.3g} s", design.wall_seconds));
   run.warn(design.warnings);
   run.warn(design.final_evaluation.warnings);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
@@ -254,10 +315,11 @@ int design_command(const CommandContext& context) {
             optimized_problem_text(run, values, design.mode ? design.mode->bodies : std::vector<Body>{}));
   run.write("history.csv", to_csv(history));
   if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory, after.simulation.statistics.singular);
-  run.write("report.html",
-            design_report(scene, design.rho, run.result, history, {before.trajectory, before.forces, before.running},
-                          {after.trajectory, after.forces, after.running}, sensor_limits(run.problem),
-                          running_terms(run.problem, units), prescribed_points(run.problem, after.instants)));
+  add_convergence(page, history, unit_of(run.result["objectives"][design.objective]));
+  add_multistart(page);
+  add_motions(page, with_values(scene, design.rho), before, after);
+  add_running_terms(page, units, before, after);
+  page.write();
   return long_run.finish();
 }
 

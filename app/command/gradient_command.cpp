@@ -5,12 +5,11 @@
 #include <cmath>
 #include <map>
 
-#include "app/report/run_report.hpp"
+#include "app/report/run_page.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/run/command.hpp"
-#include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/cvodes/cvodes.hpp"
@@ -31,28 +30,25 @@ const std::map<std::string, GradientMethod> kMethods{{"auto", GradientMethod::au
                                                      {"cvodes_adjoint", GradientMethod::cvodes_adjoint},
                                                      {"fd", GradientMethod::differences}};
 
-void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<std::optional<double>>& true_values) {
-  const Scene& scene = run.problem.scene;
-  std::vector<std::string> header{"parameter", "value"};
-  const ObjectiveUnits units = objective_units(run.problem);
+void show_objectives(RunPage& page, const Evaluation& evaluation,
+                     const std::vector<std::optional<double>>& true_values) {
+  Run& run = page.run;
   for (std::size_t i = 0; i < run.problem.objectives.size(); ++i) {
-    const std::string& name = run.problem.objectives[i].name;
     const auto row = static_cast<Eigen::Index>(i);
-    run.result["objectives"][name] = objective_json(evaluation.psi(row), true_values[i]);
-    run.result["objectives"][name]["gradient"] = by_name(names_of(scene.parameters), evaluation.psi_rho.row(row));
-    run.context.out << objective_line(name, evaluation.psi(row), true_values[i], units);
-    header.push_back("d " + name);
+    Json& objective = run.result["objectives"][run.problem.objectives[i].name];
+    objective = objective_json(evaluation.psi(row), true_values[i]);
+    objective["gradient"] = by_name(names_of(run.problem.scene.parameters), evaluation.psi_rho.row(row));
   }
-  add_units(run.result, units);
-  TextTable table(header);
-  for (std::size_t k = 0; k < scene.parameters.size(); ++k) {
-    std::vector<std::string> row{scene.parameters[k].name, significant(scene.parameters[k].value)};
-    for (Eigen::Index i = 0; i < evaluation.psi.size(); ++i) {
-      row.push_back(significant(evaluation.psi_rho(i, static_cast<Eigen::Index>(k)), 12));
-    }
-    table.add(std::move(row));
-  }
-  run.context.out << '\n' << table.text();
+  add_units(run.result, objective_units(run.problem));
+  for (const auto& [name, objective] : run.result["objectives"].items())
+    run.context.out << objective_line(name, objective);
+  page.verdict(fmt::format("{} of {} by {}: {}.", counted(run.problem.objectives.size(), "gradient"),
+                           counted(run.problem.scene.parameters.size(), "parameter"),
+                           run.result.at("methods").begin().key(),
+                           fmt::join(objective_values(run.result.at("objectives")), ", ")));
+  add_objectives(page);
+  page.print(gradient_table(run));
+  add_gradients(page);
 }
 
 constexpr Eigen::Index kColumns = 6;   // of a table
@@ -82,7 +78,7 @@ void print_hessian(std::ostream& out, const ObjectiveHessian& H, const std::stri
     header.insert(header.end(), parameters.begin() + first, parameters.begin() + end);
     TextTable table(header);
     for (Eigen::Index p = first; p < n; ++p) {
-      std::vector<std::string> row{parameters[static_cast<std::size_t>(p)]};
+      TableRow row{parameters[static_cast<std::size_t>(p)]};
       for (Eigen::Index q = first; q < std::min(end, p + 1); ++q)
         row.push_back(entry_text(H.value(p, q), H.error(p, q)));
       table.add(std::move(row));
@@ -184,11 +180,13 @@ int gradient_command(const CommandContext& context) {
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
-  add_objectives(run, evaluation, true_values);
+  RunPage page(run);
+  show_objectives(page, evaluation, true_values);
   run.warn(missed_peaks(evaluator.objectives(), evaluation.psi, true_values));
   add_cases(run, true, options.method);
   if (context.options.hessian) add_second_derivatives(run, evaluator);
-  run.write("report.html", gradient_report(scene, run.result));
+  add_simulation(page, scene);
+  page.write();
   return run.finish();
 }
 

@@ -1,12 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <initializer_list>
 #include <limits>
 #include <utility>
 
-#include "app/report/motion_plots.hpp"
-#include "app/report/run_report.hpp"
+#include "app/report/identification_page.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/channel_data.hpp"
@@ -16,7 +14,6 @@
 #include "app/results/optimized_problem.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
-#include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
 #include "app/starts/json_records.hpp"
 #include "app/starts/multistart.hpp"
@@ -39,49 +36,6 @@
 
 namespace mbsopt::inline app {
 namespace {
-
-std::string without_unit(const std::string& column) { return column.substr(0, column.find(" [")); }
-
-// One plot per channel of each record. start holds the initial values; channels that it lacks are left out.
-std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTable>& data,
-                               const IdentificationResult& fit, const IdentificationResult& start) {
-  std::vector<FitPlot> plots;
-  const RecordChannels channels = record_channels(*problem.identification);
-  for (const auto& [e, c] : channels.all) {
-    const ExperimentSpec& experiment = problem.identification->experiments[e];
-    plots.push_back({.experiment = record_name(experiment),
-                     .channel = without_unit(experiment.channels[c].column),
-                     .unit = unit_of_channel(problem.scene, experiment.channels[c], data[e]),
-                     .validates = experiment.validate});
-  }
-  // Between the windows of a record lies a gap: neither a curve nor a correlation continues across it.
-  using Column = std::pair<std::vector<double> FitPlot::*, double ResidualRow::*>;
-  const auto add_rows = [&](const IdentificationResult& of, std::vector<double> FitPlot::*times,
-                            std::initializer_list<Column> columns) {
-    std::vector<std::optional<std::size_t>> last(plots.size());  // experiment of a plot
-    for (const ResidualRow& row : of.residuals) {
-      const std::size_t k = channels.first[row.experiment] + row.channel;
-      std::vector<double>& t = plots[k].*times;
-      const bool is_next = last[k] && last[k] != row.experiment;
-      if (is_next) t.push_back((t.back() + row.t) / 2);
-      t.push_back(row.t);
-      for (const auto& [column, value] : columns) {
-        if (is_next) (plots[k].*column).push_back(std::numeric_limits<double>::quiet_NaN());
-        (plots[k].*column).push_back(row.*value);
-      }
-      last[k] = row.experiment;
-    }
-  };
-  add_rows(fit, &FitPlot::times,
-           {{&FitPlot::measured, &ResidualRow::measured},
-            {&FitPlot::model, &ResidualRow::model},
-            {&FitPlot::residual, &ResidualRow::scaled},
-            {&FitPlot::prediction, &ResidualRow::prediction}});
-  add_rows(start, &FitPlot::initial_times, {{&FitPlot::initial, &ResidualRow::model}});
-  // A fit that ended within its first evaluation has no residuals.
-  std::erase_if(plots, [](const FitPlot& plot) { return plot.times.empty(); });
-  return plots;
-}
 
 void set_units(IdentificationResult& fit, const Problem& problem, const std::vector<CsvTable>& data) {
   for (std::size_t e = 0; e < fit.experiments.size(); ++e)
@@ -155,14 +109,10 @@ Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& 
 void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, const std::optional<OtherModel>& other) {
   const CommandOptions& options = run.context.options;
   if (options.recover > 0 && !interrupted()) {
-    const Recovery recovery = recovered(run, cut, fit, false);
-    print_recovery(run.context.out, recovery);
-    add_to_result(run.result, recovery);
+    show_recovery(run, recovered(run, cut, fit, false));
   }
   if (options.bootstrap > 0 && !interrupted()) {
-    const Recovery bootstrap = recovered(run, cut, fit, true);
-    print_bootstrap(run.context.out, fit, bootstrap);
-    add_bootstrap(run.result, bootstrap);
+    show_bootstrap(run, fit, recovered(run, cut, fit, true));
   }
   if (other && !interrupted()) other->compare(run, fit, simulating(run));
 }
@@ -193,8 +143,7 @@ int preflight(Run& run, const IdentificationResult& start) {
     run.failed(start.message);
     return run.finish();
   }
-  print_preflight(run.context.out, start);
-  add_preflight(run.result, start);
+  show_preflight(run, start);
   run.warn(start.warnings);
   return run.finish();
 }
@@ -268,21 +217,6 @@ std::vector<PointTarget> measured_points(const Problem& fitted, const Scene& sce
   return point_targets(scene, values, true);
 }
 
-// The report omits motions if a simulation stopped. start holds all experiments; explained has the fitted values.
-std::string report_of(const Run& run, const CutProblem& cut, const IdentificationResult& start,
-                      const SimulatedExperiment& before, const Problem& explained,
-                      const std::optional<SimulatedExperiment>& after, const IdentificationResult& fit,
-                      const Trajectory& history) {
-  std::vector<MovingState> states;
-  if (after && after->simulation.ok()) {
-    const std::vector<PointTarget> measured = measured_points(explained, after->scene, fit);
-    states.push_back({"initial", before.scene, before.trajectory, true});
-    states.push_back({"fitted", after->scene, after->trajectory, false, measured, after->forces});
-  }
-  return identification_report(run.problem.scene, run.result, history, fit_plots(cut.problem, cut.data, fit, start),
-                               states);
-}
-
 std::vector<NewValue> new_values(const IdentificationResult& fit) {
   std::vector<NewValue> values;
   for (const FittedParameter& p : fit.parameters) values.push_back({p.experiment, p.parameter, p.value});
@@ -346,7 +280,8 @@ int identify_command(const CommandContext& context) {
     fit.cost_initial = fit.cost_final = std::numeric_limits<double>::quiet_NaN();
   set_units(fit, cut.problem, data);
   add_to_result(run.result, fit);
-  print_fit(context.out, fit, effort(run, fit.simulations, fit.wall_seconds));
+  RunPage page(run);
+  show_fit(page, fit, effort(run, fit.simulations, fit.wall_seconds));
   run.warn(fit.warnings);
   const Trajectory history = history_of(fit);
   run.write("optimized.json", optimized_problem_text(run, new_values(fit)));
@@ -364,7 +299,15 @@ int identify_command(const CommandContext& context) {
     long_run.failed(fit.status, fit.message);
     if (other) run.warn("--compare: is skipped, since the fit did not converge");
   }
-  run.write("report.html", report_of(run, cut, start, before, explained, after, fit, history));
+  if (after && after->simulation.ok()) {
+    page.heading("Motion of the first experiment");
+    add_motion(page, {{"initial", before.scene, before.trajectory, true},
+                      {"fitted", after->scene, after->trajectory, false, measured_points(explained, after->scene, fit),
+                       after->forces}});
+  }
+  add_fit_plots(page, cut.problem, data, fit, start);
+  add_convergence(page, history);
+  page.write();
   return long_run.finish();
 }
 

@@ -5,14 +5,12 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "app/report/run_report.hpp"
+#include "app/report/run_page.hpp"
 #include "app/results/joint_forces.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/simulated_motion.hpp"
 #include "app/run/command.hpp"
-#include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "app/terminal/text_table.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/kinematic_scene.hpp"
 #include "core/start/kinematics.hpp"
@@ -63,7 +61,6 @@ bool are_numbers(const DriveEfforts& efforts, const KinematicsResult& kinematics
 }
 
 void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
-  TextTable table({"drive", "least", "largest", "unit"});
   for (std::size_t k = 1; k < efforts.table.columns.size(); ++k) {
     double least = INFINITY, largest = -INFINITY;
     for (const std::vector<double>& row : efforts.table.rows) {
@@ -74,10 +71,12 @@ void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
     const auto drive = std::ranges::find(scene.drives, name, &Drive::name);
     const std::string unit = drive == scene.drives.end() ? "N or N m" : unit_of_effort(*drive);
     run.result["drives"][name] = {{"force_min", least}, {"force_max", largest}, {"unit", unit}};
-    table.add({name, significant(least, 6), significant(largest, 6), unit});
   }
   if (run.result.contains("drives"))
-    run.context.out << "\nforce or torque of each drive along its coordinate\n" << table.text();
+    run.context.out << "\nforce or torque of each drive along its coordinate\n"
+                    << table_of(run.result["drives"],
+                                {{"drive"}, {"least", "force_min", 6}, {"largest", "force_max", 6}, {"unit", "unit"}})
+                           .text();
 }
 
 }  // namespace
@@ -144,11 +143,13 @@ int kinematics_command(const CommandContext& context) {
   } else if (!kinematics.ok) {
     run.failed(kinematics.message, kinematics.last_good_time);
   }
-  run.write("report.html", simulation_report(scene, run.result, trajectory,
-                                             {.targets = prescribed_points(run.problem),
-                                              .forces = forces.table(),
-                                              .efforts = efforts.table,
-                                              .instants = singular}));
+  RunPage page(run);
+  add_simulated_motion(page, scene, trajectory,
+                       {.targets = prescribed_points(run.problem),
+                        .forces = forces.table(),
+                        .efforts = efforts.table,
+                        .instants = singular});
+  page.write();
   return run.finish();
 }
 

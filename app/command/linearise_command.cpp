@@ -1,18 +1,20 @@
+// Linearises the motion at one state: modes for the terminal, with shapes and responses in the report.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
-#include "app/report/run_report.hpp"
+#include "app/report/mechanism_drawing.hpp"
+#include "app/report/run_page.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
-#include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "app/terminal/text_table.hpp"
 #include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
+#include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/simulate/simulation.hpp"
 #include "core/start/linearisation.hpp"
@@ -127,17 +129,25 @@ Json to_json(const Scene& scene, const Linearisation& x, const State& state, con
           {"basis", rows_of(x.basis)}};
 }
 
-void print_modes(std::ostream& out, const Json& modes) {
+void show_modes(RunPage& page, const Json& modes) {
+  page.heading("Modes");
+  if (modes.empty()) return;
+  double slowest = INFINITY, fastest = 0, growth = -INFINITY, damping = INFINITY;
   TextTable table({"mode", "eigenvalue [1/s]", "frequency [Hz]", "damping ratio", "moves most"});
-  int mode = 0;
   for (const Json& m : modes) {
-    const double re = m["eigenvalue"][0], im = m["eigenvalue"][1];
+    const double re = m["eigenvalue"][0], im = m["eigenvalue"][1], f = m["frequency"];
     const std::string value =
         im == 0 ? significant(re, 6) : fmt::format("{} +- {} i", significant(re, 6), significant(im, 6));
-    table.add({std::to_string(++mode), value, significant(m["frequency"], 6), significant(m["damping_ratio"], 4),
-               m["moves_most"]});
+    table.add({std::to_string(table.rows().size() + 1), value, number_cell(f, 6), number_cell(m["damping_ratio"], 4),
+               cell(m["moves_most"])});
+    slowest = std::min(slowest, f), fastest = std::max(fastest, f);
+    growth = std::max(growth, re), damping = std::min(damping, m["damping_ratio"].get<double>());
   }
-  out << '\n' << table.text();
+  page.verdict(
+      fmt::format("{} from {:.4g} Hz to {:.4g} Hz; the least damping ratio is {:.3g} and the largest real part "
+                  "of an eigenvalue {:.3g} 1/s.",
+                  counted(modes.size(), "mode"), slowest, fastest, damping, growth));
+  page.both(table);
 }
 
 void warn_of(Run& run, const Linearisation& x, const State& state) {
@@ -172,6 +182,77 @@ std::vector<double> displaced_row(const Mechanism& mechanism, const State& state
   return body_columns(mechanism, {state.t, y, state.angles});
 }
 
+void add_shapes(RunPage& page, const Mechanism& mechanism, const State& state, const Linearisation& x) {
+  constexpr std::size_t kDrawn = 12;  // modes that a reader still tells apart
+  const Scene& scene = page.run.problem.scene;
+  const std::vector<double> rest = body_columns(mechanism, {state.t, state.y, state.angles});
+  std::size_t modes = 0;
+  for (Eigen::Index k = 0; k < x.eigenvalues.size(); ++k) {
+    if (x.eigenvalues(k).imag() < 0 || ++modes > kDrawn) continue;
+    const std::vector<double> shape = displaced_row(mechanism, state, x, k);
+    const std::string title = fmt::format("Mode {}, {} Hz", modes, significant(frequency(x.eigenvalues(k)), 4));
+    const std::array<int, 2> plane = plane_of_motion(scene, {trajectory_columns(scene), {rest, shape}}).axes;
+    page.drawing(mechanism_drawing(title, plane, {{"state", scene, rest}, {"displaced", scene, shape}}));
+  }
+  if (modes > kDrawn) page.paragraph(fmt::format("The first {} of {} modes are drawn.", kDrawn, modes));
+}
+
+// "rad/N", "m/(N/m)"
+std::string per(const std::string& output, const std::string& input) {
+  if (input.empty()) return output;
+  const bool one = input.find_first_of(" /*") == std::string::npos;
+  return output + (one ? "/" + input : "/(" + input + ")");
+}
+
+// The amplitude of each output for an input of amplitude 1, from a tenth of the slowest to ten times the fastest mode.
+void add_responses(RunPage& page, const Linearisation& x) {
+  constexpr int kFrequencies = 400;
+  constexpr std::size_t kDrawn = 12;
+  const Scene& scene = page.run.problem.scene;
+  const Json& result = page.run.result.at("linearisation");
+  const auto inputs = result.at("inputs").get<std::vector<std::string>>(),
+             outputs = result.at("outputs").get<std::vector<std::string>>();
+  if (inputs.empty() || outputs.empty()) return;
+  double slowest = INFINITY, fastest = 0;
+  for (const std::complex<double>& e : x.eigenvalues)
+    if (const double f = frequency(e); f > 0) slowest = std::min(slowest, f), fastest = std::max(fastest, f);
+  page.heading("From inputs to outputs");
+  page.paragraph(
+      "Static: the change of the output by a constant input of 1. Below: the amplitude of the output when the input "
+      "swings with amplitude 1.");
+  const Eigen::MatrixXcd still = transfer(x, 0);
+  std::vector<double> frequencies;
+  std::vector<Eigen::MatrixXcd> swinging;
+  for (int k = 0; k <= kFrequencies && fastest > 0; ++k) {
+    frequencies.push_back(0.1 * slowest * std::pow(100 * fastest / slowest, static_cast<double>(k) / kFrequencies));
+    swinging.push_back(transfer(x, {0, 2 * std::numbers::pi * frequencies.back()}));
+  }
+  std::vector<TableRow> rows;
+  std::vector<LinePlot> plots;
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    const auto parameter = std::ranges::find(scene.parameters, inputs[j], &Parameter::name);
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
+      const auto sensor = std::ranges::find(scene.sensors, outputs[i], &Sensor::name);
+      const std::string unit = per(unit_in(scene, *sensor), parameter->unit);
+      const double gain = still(row, column).real();
+      rows.push_back({inputs[j], outputs[i], std::isfinite(gain) ? number_cell(gain, 6) : TableCell("-"), unit});
+      std::vector<double> amplitudes;
+      for (const Eigen::MatrixXcd& G : swinging) amplitudes.push_back(std::abs(G(row, column)));
+      if (rows.size() <= kDrawn && std::ranges::any_of(amplitudes, [](double y) { return y > 0; }))
+        plots.push_back({.title = fmt::format("{} by {}", outputs[i], inputs[j]),
+                         .x_label = "frequency [Hz]",
+                         .y_label = fmt::format("amplitude [{}]", unit),
+                         .series = {{outputs[i], frequencies, amplitudes}},
+                         .logarithmic_y = true,
+                         .logarithmic_x = true});
+    }
+  }
+  page.table({"input", "output", "static", "unit"}, rows);
+  for (const LinePlot& plot : plots) page.plot(plot);
+  if (rows.size() > kDrawn) page.note(fmt::format("The first {} of {} responses are drawn.", kDrawn, rows.size()));
+}
+
 }  // namespace
 
 int linearise_command(const CommandContext& context) {
@@ -199,18 +280,14 @@ int linearise_command(const CommandContext& context) {
   const Linearisation x =
       linearise(mechanism, scene.simulation.formulation, {state->t, state->y, state->angles}, inputs, outputs);
   run.result["linearisation"] = to_json(scene, x, *state, inputs, outputs);
-  const Json& modes = run.result["linearisation"]["modes"];
   context.out << fmt::format("linearised at t = {:.6g} s on {} free coordinate{}\n", state->t, x.A.rows() / 2,
                              x.A.rows() == 2 ? "" : "s");
-  if (!modes.empty()) print_modes(context.out, modes);
+  RunPage page(run);
+  show_modes(page, run.result["linearisation"]["modes"]);
   warn_of(run, x, *state);
-
-  std::vector<std::vector<double>> shapes;
-  for (Eigen::Index k = 0; k < x.eigenvalues.size(); ++k) {
-    if (x.eigenvalues(k).imag() >= 0) shapes.push_back(displaced_row(mechanism, *state, x, k));
-  }
-  run.write("report.html", linearisation_report(scene, run.result, x,
-                                                body_columns(mechanism, {state->t, state->y, state->angles}), shapes));
+  add_shapes(page, mechanism, *state, x);
+  add_responses(page, x);
+  page.write();
   return run.finish();
 }
 

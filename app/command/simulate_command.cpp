@@ -1,13 +1,11 @@
 #include <fmt/format.h>
 
-#include "app/report/run_report.hpp"
+#include "app/report/run_page.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/simulated_motion.hpp"
 #include "app/run/command.hpp"
-#include "app/run/run.hpp"
-#include "app/terminal/text_table.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 
 namespace mbsopt::inline app {
@@ -16,18 +14,14 @@ namespace {
 void add_objectives(Run& run, const SimulatedMotion& motion) {
   const Eigen::VectorXd& psi = motion.psi;
   if (psi.size() == 0) return;
-  const ObjectiveUnits units = objective_units(run.problem);
-  TextTable table({"objective", "value", "unit", "true extreme"});
   for (Eigen::Index i = 0; i < psi.size(); ++i) {
-    const std::string& name = run.problem.objectives[static_cast<std::size_t>(i)].name;
-    const std::optional<double>& true_value = motion.true_values[static_cast<std::size_t>(i)];
-    run.result["objectives"][name] = objective_json(psi(i), true_value);
-    if (const std::vector<double>& instants = motion.instants[static_cast<std::size_t>(i)]; !instants.empty())
-      run.result["objectives"][name]["instants"] = instants;
-    table.add({name, significant(psi(i), 10), shown_unit(units, name), or_blank(true_value, 10)});
+    const auto k = static_cast<std::size_t>(i);
+    Json& objective = run.result["objectives"][run.problem.objectives[k].name];
+    objective = objective_json(psi(i), motion.true_values[k]);
+    if (!motion.instants[k].empty()) objective["instants"] = motion.instants[k];
   }
-  add_units(run.result, units);
-  run.context.out << '\n' << table.text({"true extreme"});
+  add_units(run.result, objective_units(run.problem));
+  run.context.out << '\n' << objective_table(run.result).text();
 }
 
 }  // namespace
@@ -61,9 +55,10 @@ int simulate_command(const CommandContext& context) {
   } else {
     run.failed(simulation.message, simulation.last_good_time);
   }
-  run.write("report.html",
-            simulation_report(scene, run.result, motion.trajectory,
-                              {.targets = prescribed_points(run.problem, motion.instants), .forces = motion.forces}));
+  RunPage page(run);
+  add_simulated_motion(page, scene, motion.trajectory,
+                       {.targets = prescribed_points(run.problem, motion.instants), .forces = motion.forces});
+  page.write();
   return run.finish();
 }
 

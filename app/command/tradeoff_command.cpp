@@ -1,13 +1,11 @@
 #include <fmt/format.h>
 
-#include "app/report/run_report.hpp"
+#include "app/report/tradeoff_page.hpp"
 #include "app/results/accuracy_results.hpp"
-#include "app/results/objective_units.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/tradeoff_results.hpp"
 #include "app/run/command.hpp"
 #include "app/run/provenance.hpp"
-#include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "optim/fit/windows.hpp"
@@ -23,13 +21,15 @@ TradeoffOptions options_of(Run& run) {
 
 // Adds the reference and the table, or why there is none. Returns whether there is one.
 template <class Study>
-bool add_table(Run& run, const Tradeoff& table, const Study& study) {
+bool add_table(RunPage& page, const Tradeoff& table, const Study& study) {
+  Run& run = page.run;
   run.progress.finish();
   if (!table.ok()) {
     table.interrupted ? run.stopped("there was no reference yet, nothing is kept") : run.failed(table.message);
     return false;
   }
-  add_reference(run, table.reference);
+  add_machine(page);
+  show_reference(page, table.reference);
   if (!table.rows.empty()) run.write("tradeoff.csv", to_csv(study));
   return true;
 }
@@ -43,8 +43,9 @@ void sweep(Run& run) {
   const TradeoffOptions options = options_of(run);
   const Problem& problem = run.problem;
   Tradeoff tradeoff = measure_tradeoff(problem.scene, objectives_of(problem), options);
-  if (!add_table(run, tradeoff, tradeoff)) return;
-  add_given_settings(run, tradeoff);
+  RunPage page(run);
+  if (!add_table(page, tradeoff, tradeoff)) return;
+  show_given_settings(run, tradeoff);
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
   const CutProblem cut = cut_into_windows(problem, data, {}, [](double) { return !interrupted(); });
   run.warn(cut.warnings);
@@ -52,30 +53,33 @@ void sweep(Run& run) {
   // The sum of squares of `identify` is not an objective of the file; the integrator limits its accuracy.
   std::optional<FitErrors> fit;
   if (problem.identification && !tradeoff.interrupted)
-    add_fit_errors(run, fit.emplace(cut.problem, cut.data, options.interrupted));
+    show_fit_errors(run, fit.emplace(cut.problem, cut.data, options.interrupted));
   TaskAdviser adviser(problem, tradeoff, fit ? &*fit : nullptr, kFits * options.budget_seconds);
   if (options.budget_seconds > 0) {
-    add_recommendations(run, tradeoff, !tradeoff.interrupted && (problem.design || fit) ? &adviser : nullptr);
-    add_outcomes(run, tradeoff);
+    show_recommendations(page, tradeoff, !tradeoff.interrupted && (problem.design || fit) ? &adviser : nullptr);
+    show_outcomes(run, tradeoff);
   }
   if (tradeoff.interrupted) {
     stopped(run, tradeoff);
   } else if (run.context.options.apply) {
     const Recommendation advice = adviser.at(*run.context.options.apply);
-    add_applied(run, tradeoff, advice, adviser.fit());
+    show_applied(page, tradeoff, advice, adviser.fit());
     if (advice.row)
       run.write("recommended.json", recommended_problem_text(run, tradeoff.rows[*advice.row].setting.simulation));
   }
-  run.write("report.html", tradeoff_report(run.result, tradeoff, objective_units(problem)));
+  add_work_precision(page, tradeoff);
+  page.write();
 }
 
 void penalty_study(Run& run) {
   const PenaltyStudy study = study_penalty(run.problem.scene, objectives_of(run.problem),
                                            alphas_of(run.context.options.alpha), options_of(run));
-  if (!add_table(run, study.table, study)) return;
-  if (!study.table.rows.empty()) add_penalty_study(run, study);
+  RunPage page(run);
+  if (!add_table(page, study.table, study)) return;
+  if (!study.table.rows.empty()) show_penalty_study(page, study);
   if (study.table.interrupted) stopped(run, study.table);
-  run.write("report.html", penalty_report(run.result, study));
+  add_penalty_plots(page, study);
+  page.write();
 }
 
 }  // namespace

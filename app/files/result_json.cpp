@@ -1,6 +1,7 @@
 #include "app/files/result_json.hpp"
 
 #include <array>
+#include <cmath>
 
 namespace mbsopt::inline app {
 namespace {
@@ -67,6 +68,11 @@ Json to_json(const SimulationStatistics& statistics) {
 }
 
 Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+double number_of(const Json& object, const std::string& key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : NAN;
+}
 
 const char* bound_hit(bool lower, bool upper) { return lower ? "lower" : upper ? "upper" : ""; }
 

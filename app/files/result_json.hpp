@@ -14,6 +14,7 @@ Json to_json(const ModelSummary& summary);
 Json to_json(const SimulationStatistics& statistics);
 
 Json or_null(const std::optional<double>& value);
+double number_of(const Json& object, const std::string& key);  // NaN if it is none
 
 // "lower", "upper" or "": the bound at which a value is.
 const char* bound_hit(bool lower, bool upper);

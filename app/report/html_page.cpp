@@ -24,23 +24,24 @@ std::string list_of(const std::vector<std::string>& words) { return html_escaped
 
 // breaks allows several lines of text.
 std::string cell_of(const TableCell& cell, bool words, bool breaks) {
-  std::string attributes;
-  if (!cell.full.empty() && cell.full != cell.text) attributes += fmt::format(" title=\"{}\"", html_escaped(cell.full));
+  std::string attributes, shown = cell.brief.empty() ? cell.text : cell.brief;
+  if (shown.empty() && !cell.shade) shown = "-";
+  if (!cell.full.empty() && cell.full != shown) attributes += fmt::format(" title=\"{}\"", html_escaped(cell.full));
   if (cell.shade) {
     attributes += fmt::format(" class=\"shade\" style=\"--tone:var({});--depth:{:.2f}\"",
                               *cell.shade < 0 ? "--c1" : "--c0", std::min(1.0, std::abs(*cell.shade)));
   } else if (words) {
     attributes += " class=\"words\"";
   }
-  std::string text = breaks ? html_words(cell.text) : html_escaped(cell.text);
+  std::string text = breaks ? html_words(shown) : html_escaped(shown);
   if (!cell.link.empty()) text = fmt::format("<a href=\"{}\">{}</a>", html_escaped(cell.link), text);
   return fmt::format("<td{}>{}</td>", attributes, text);
 }
 
 }  // namespace
 
-void HtmlPage::add(std::string_view opening, std::string_view text, std::string_view closing) {
-  body_ += fmt::format("{}{}{}", opening, html_words(text), closing);
+void HtmlPage::add(std::string& part, std::string_view opening, std::string_view text, std::string_view closing) {
+  part += fmt::format("{}{}{}", opening, html_words(text), closing);
 }
 
 void HtmlPage::heading(std::string_view text) {
@@ -113,10 +114,10 @@ std::string HtmlPage::text() const {
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<meta name=\"color-scheme\" "
       "content=\"light dark\">\n<title>{0}</title><style>{1}</style></head>\n<body>\n"
-      "<nav aria-label=\"Contents\">{2}</nav>\n<main>\n<h1>{0}</h1>\n{3}</main>\n"
+      "<nav aria-label=\"Contents\">{2}</nav>\n<main>\n<h1>{0}</h1>\n{3}{6}</main>\n"
       "<script type=\"application/json\" "
       "id=\"data\">{4}</script>\n<script>{5}</script>\n</body></html>\n",
-      html_escaped(title_), kReportStyle, contents, body_, data, kReportScript);
+      html_escaped(title_), kReportStyle, contents, top_, data, kReportScript, body_);
 }
 
 }  // namespace mbsopt::inline app

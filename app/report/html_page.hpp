@@ -6,43 +6,34 @@
 // values of a plot from its drawing, and motions from one block of JSON.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "app/files/json_text.hpp"
+#include "app/terminal/text_table.hpp"
 
 namespace mbsopt::inline app {
 
 struct LinePlot;
-
-// A cell shows a rounded number and, under the pointer, all digits.
-struct TableCell {
-  std::string text, full = {};
-  std::optional<double> shade = {};  // from -1 to 1: the colour of a heat map
-  std::string link = {};
-  TableCell(std::string shown, std::string digits = {}) : text(std::move(shown)), full(std::move(digits)) {}
-  TableCell(const char* shown) : text(shown) {}
-};
-using TableRow = std::vector<TableCell>;
 
 class HtmlPage {
  public:
   explicit HtmlPage(std::string title) : title_(std::move(title)) {}
 
   void heading(std::string_view text);
-  // One sentence with the numbers that matter most.
-  void verdict(std::string_view text) { add("<p class=\"verdict\">", text); }
-  void warning(std::string_view text) { add("<p class=\"warning\">Warning: ", text); }
-  void paragraph(std::string_view text) { add("<p>", text); }
-  void note(std::string_view text) { add("<p class=\"note\">", text); }  // in small print
-  // Text that a reader must see first.
-  void banner(std::string_view text) { add("<p class=\"banner\" role=\"alert\">", text); }
-  void code(std::string_view text) { add("<code>", text, "</code>\n"); }
+  // The top of the page: one sentence with the numbers that matter most, text that a reader must see first, notes.
+  void verdict(std::string_view text) { add(top_, "<p class=\"verdict\">", text); }
+  void banner(std::string_view text) { add(top_, "<p class=\"banner\" role=\"alert\">", text); }
+  void remark(std::string_view text) { add(top_, "<p>", text); }
+  void warning(std::string_view text) { add(top_, "<p class=\"warning\">Warning: ", text); }
+  void paragraph(std::string_view text) { add(body_, "<p>", text); }
+  void note(std::string_view text) { add(body_, "<p class=\"note\">", text); }  // in small print
+  void code(std::string_view text) { add(body_, "<code>", text, "</code>\n"); }
   // The first column holds names; the others are numbers or short words. A dense table has narrow columns, for colours.
+  // An empty cell without a colour is a dash.
   void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense = false);
+  void table(const TextTable& shown) { table(shown.header(), shown.rows()); }
   void plot(const LinePlot& plot);
   // Parts of which the script shows one at a time. `names` are those of the selectors. `keys` give the choice of each,
   // and id serves links to it.
@@ -59,9 +50,10 @@ class HtmlPage {
   std::string text() const;
 
  private:
-  void add(std::string_view opening, std::string_view text, std::string_view closing = "</p>\n");
+  static void add(std::string& part, std::string_view opening, std::string_view text,
+                  std::string_view closing = "</p>\n");
 
-  std::string title_, body_;
+  std::string title_, top_, body_;
   std::vector<std::string> headings_;
   Json data_ = {{"motions", Json::array()}, {"runs", Json::array()}};  // for the script
 };

@@ -10,7 +10,7 @@
 
 #include "app/files/atomic_file.hpp"
 #include "app/report/html_page.hpp"
-#include "app/report/report_parts.hpp"
+#include "app/report/run_page.hpp"
 #include "optim/problem/regular_file.hpp"
 
 namespace mbsopt::inline app {

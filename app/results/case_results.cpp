@@ -38,7 +38,7 @@ void add_cases(Run& run, bool gradients, GradientMethod method) {
   TextTable table(header);
   for (std::size_t c = 0; c < evaluator.cases(); ++c) {
     const Evaluation& e = all.of_cases[c];
-    std::vector<std::string> row{evaluator.case_name(c)};
+    TableRow row{evaluator.case_name(c)};
     Json& result = run.result["cases"][evaluator.case_name(c)]["objectives"];
     for (std::size_t i = 0; i < objectives.size(); ++i) {
       const Eigen::Index at = static_cast<Eigen::Index>(i);

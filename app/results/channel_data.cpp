@@ -93,17 +93,6 @@ void add_residuals(std::vector<ChannelData>& channels, const Problem& problem, c
     if (samples[k] > 0) channels[k].rms_scaled = std::sqrt(squares[k] / samples[k]);
 }
 
-std::string channel_table(const std::vector<ChannelData>& channels) {
-  const bool simulated = std::ranges::any_of(channels, [](const auto& c) { return !std::isnan(c.rms_scaled); });
-  TextTable table({"experiment", "channel", "samples", "missing", "rate", "largest gap", "least", "most", "unit",
-                   "rms/sigma at the start"});
-  for (const ChannelData& c : channels)
-    table.add({c.experiment, c.column, std::to_string(c.samples), std::to_string(c.missing),
-               c.interval > 0 ? significant(1 / c.interval, 3) + " Hz" : "-", significant(c.gap, 3) + " s",
-               significant(c.least, 4), significant(c.most, 4), c.unit, simulated ? significant(c.rms_scaled, 4) : ""});
-  return table.text({"rms/sigma at the start"});
-}
-
 Json to_json(const std::vector<ChannelData>& channels) {
   Json all = Json::array();
   for (const ChannelData& c : channels)
@@ -119,6 +108,27 @@ Json to_json(const std::vector<ChannelData>& channels) {
                    {"most", c.most},
                    {"rms_scaled", c.rms_scaled}});
   return all;
+}
+
+std::string channel_table(const std::vector<ChannelData>& channels) {
+  Json rows = to_json(channels);
+  for (Json& row : rows) {
+    const double interval = number_of(row, "interval");
+    row["rate"] = interval > 0 ? significant(1 / interval, 3) + " Hz" : "-";
+    row["gap"] = cell(row["largest_gap"], 3) + " s";
+    if (std::isnan(number_of(row, "rms_scaled"))) row.erase("rms_scaled");
+  }
+  return table_of(rows, {{"experiment", "experiment"},
+                         {"channel", "column"},
+                         {"samples", "samples"},
+                         {"missing", "missing"},
+                         {"rate", "rate"},
+                         {"largest gap", "gap"},
+                         {"least", "least", 4},
+                         {"most", "most", 4},
+                         {"unit", "unit"},
+                         {"rms/sigma at the start", "rms_scaled", 4, true}})
+      .text();
 }
 
 void add_windows(Run& run, const Problem& cut) {

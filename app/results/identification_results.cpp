@@ -14,115 +14,6 @@
 namespace mbsopt::inline app {
 namespace {
 
-constexpr Eigen::Index kWholeMatrix = 10;  // parameters, up to which the correlation is printed whole
-constexpr std::size_t kInfluences = 3;     // number of printed ones
-constexpr double kStrong = 0.9;            // correlation worth a line of its own
-
-std::string error_of(const FittedParameter& p) {
-  return std::isfinite(p.std_error) ? significant(p.std_error, 3) : "-";
-}
-
-std::string interval_of(const FittedParameter& p) {
-  if (std::isnan(p.std_error)) return "-";
-  if (std::isinf(p.std_error)) return "undetermined";
-  return fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1]));
-}
-
-void add_rows(TextTable& table, const std::vector<FittedParameter>& parameters) {
-  for (const FittedParameter& p : parameters) {
-    table.add({p.name, significant(p.initial), significant(p.value, 9), error_of(p), interval_of(p),
-               p.unit.empty() ? "-" : p.unit, bound_hit(p.at_lower, p.at_upper)});
-  }
-}
-
-// The experiments that a parameter depends on most, by more than a standard error.
-void print_influences(std::ostream& out, const IdentificationResult& fit) {
-  std::vector<const ExperimentFit*> strong;
-  const auto size = [](const ExperimentFit* e) { return std::abs(e->influence->change); };
-  for (const ExperimentFit& e : fit.experiments)
-    if (e.influence && size(&e) > 1) strong.push_back(&e);
-  std::ranges::stable_sort(strong, std::ranges::greater(), size);
-  if (strong.size() > kInfluences) strong.resize(kInfluences);
-  for (const ExperimentFit* e : strong)
-    out << (std::isinf(e->influence->change)
-                ? fmt::format("without {}, {} is not determined\n", e->name, e->influence->parameter)
-                : fmt::format("without {}, {} would change by {:.2g} standard errors\n", e->name,
-                              e->influence->parameter, e->influence->change));
-}
-
-void print_correlation(std::ostream& out, const IdentificationResult& fit) {
-  const Eigen::MatrixXd& r = fit.statistics.correlation;
-  if (r.rows() < 2) return;
-  if (r.rows() <= kWholeMatrix) {
-    std::vector<std::string> header{"correlation"};
-    for (const FittedParameter& p : fit.parameters) header.push_back(p.name);
-    TextTable table(header);
-    for (Eigen::Index i = 0; i < r.rows(); ++i) {
-      std::vector<std::string> row{header[static_cast<std::size_t>(i) + 1]};
-      for (Eigen::Index k = 0; k <= i; ++k) row.push_back(fmt::format("{:.3f}", r(i, k)));
-      row.resize(header.size());
-      table.add(row);
-    }
-    out << '\n' << table.text();
-    return;
-  }
-  TextTable table({"correlated", "with", "correlation"});
-  for (Eigen::Index i = 0; i < r.rows(); ++i)
-    for (Eigen::Index k = 0; k < i; ++k)
-      if (std::abs(r(i, k)) >= kStrong)
-        table.add({fit.parameters[static_cast<std::size_t>(k)].name, fit.parameters[static_cast<std::size_t>(i)].name,
-                   fmt::format("{:.3f}", r(i, k))});
-  if (!table.empty()) out << '\n' << table.text();
-}
-
-void print_profiles(std::ostream& out, const IdentificationResult& fit) {
-  if (fit.profiles.empty()) return;
-  TextTable table({"profile", "95 % interval", "points"});
-  for (const ParameterProfile& p : fit.profiles) {
-    table.add({p.name,
-               fmt::format("[{}, {}]", p.lower ? significant(*p.lower) : "-", p.upper ? significant(*p.upper) : "-"),
-               std::to_string(p.points.size())});
-  }
-  out << '\n' << table.text();
-  for (const ParameterProfile& p : fit.profiles) {
-    if (!p.lower) out << fmt::format("{}: no lower end: {}\n", p.name, p.below);
-    if (!p.upper) out << fmt::format("{}: no upper end: {}\n", p.name, p.above);
-  }
-}
-
-// "the data determine 4 combinations of 4 parameters: singular values 1.8, 0.807, 0.335, 0.0239; the effects of c and T
-// cancel but for 0.024". With continuity it is "7 of the 7 combinations that continuity leaves of 13 parameters".
-std::string determined_in_words(const IdentificationResult& fit) {
-  constexpr Eigen::Index kMostValues = 6;  // singular values in a sentence
-  constexpr double kCancelled = 0.1;       // effects of size 1 that cancel below this are reported
-  constexpr double kPart = 0.2;            // of a direction of length 1, from which a parameter counts in it
-  const FitStatistics& s = fit.statistics;
-  const Eigen::Index all = s.singular_values.size();
-  std::string values;
-  for (Eigen::Index k = 0; k < all; ++k) {
-    if (all > kMostValues && k == kMostValues / 2) values += ", ...", k = all - kMostValues / 2;
-    values += (values.empty() ? "" : ", ") + significant(s.singular_values(k), 3);
-  }
-  const bool tied = all < static_cast<Eigen::Index>(fit.parameters.size());  // by equations between the parameters
-  const std::string combinations =
-      tied ? fmt::format("{} of the {} that continuity leaves", s.rank, counted(all, "combination"))
-           : counted(s.rank, "combination");
-  const std::string words = fmt::format("the data determine {} of {}: singular values {}", combinations,
-                                        counted(fit.parameters.size(), "parameter"), values);
-  std::vector<std::string> parts;
-  for (Eigen::Index k = 0; k < s.weakest.size(); ++k)
-    if (std::abs(s.weakest(k)) > kPart) parts.push_back(fit.parameters[static_cast<std::size_t>(k)].name);
-  if (parts.size() < 2 || s.singular_values(s.rank - 1) > kCancelled) return words;
-  const std::string last = parts.back();
-  parts.pop_back();
-  return words + fmt::format("; the effects of {} and {} cancel but for {:.2g}", fmt::join(parts, ", "), last,
-                             s.singular_values(s.rank - 1));
-}
-
-void print_undetermined(std::ostream& out, const FitStatistics& statistics) {
-  for (const std::string& words : statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
-}
-
 Json identifiability_of(const FitStatistics& s) {
   return {{"condition_number", s.condition_number}, {"unidentifiable", s.unidentifiable}};
 }
@@ -196,85 +87,70 @@ Json to_json(const ParameterProfile& p) {
 
 }  // namespace
 
-void print_preflight(std::ostream& out, const IdentificationResult& start) {
-  TextTable parameters({"parameter", "start", "predicted std error", "unit"});
-  for (const FittedParameter& p : start.parameters)
-    parameters.add({p.name, significant(p.initial), error_of(p), p.unit.empty() ? "-" : p.unit});
-  out << '\n' << parameters.text();
-  print_undetermined(out, start.statistics);
-  out << "\npredicted at the start, with the sigmas as given; nothing was fitted\n";
-}
-
-void add_preflight(Json& result, const IdentificationResult& start) {
-  for (const FittedParameter& p : start.parameters)
-    result["preflight"]["parameters"][p.name] = {{"start", p.initial}, {"predicted_std_error", p.std_error}};
-  result["identifiability"] = identifiability_of(start.statistics);
-}
-
-void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort) {
-  TextTable parameters({"parameter", "initial", "value", "std error", "95 % interval", "unit", "at bound"});
-  add_rows(parameters, fit.parameters);
-  TextTable channels({"experiment", "role", "channel", "samples", "rms", "sigma", "unit", "rms/sigma", "lag-1",
-                      "Ljung-Box p", "runs p", "residuals"});
-  for (const ExperimentFit& e : fit.experiments) {
-    add_rows(parameters, e.refitted);
-    for (const ChannelFit& c : e.channels) {
-      channels.add({e.name, e.validate ? "validate" : "fit", c.column, std::to_string(c.samples), significant(c.rms, 4),
-                    significant(c.sigma, 4) + (c.sigma_is_estimated ? " (estimated)" : ""), c.unit,
-                    significant(c.rms_scaled, 4), fmt::format("{:.2f}", c.analysis.autocorrelation),
-                    significant(c.analysis.ljung_box_p, 2), significant(c.analysis.runs_p, 2), c.analysis.in_words()});
-    }
-  }
-  out << '\n' << parameters.text() << '\n' << channels.text();
-  print_correlation(out, fit);
-  print_profiles(out, fit);
-  print_influences(out, fit);
+std::string determined_in_words(const IdentificationResult& fit) {
+  constexpr Eigen::Index kMostValues = 6;  // singular values in a sentence
+  constexpr double kCancelled = 0.1;       // effects of size 1 that cancel below this are reported
+  constexpr double kPart = 0.2;            // of a direction of length 1, from which a parameter counts in it
   const FitStatistics& s = fit.statistics;
-  if (fit.parameters.size() > 1) out << '\n' << determined_in_words(fit) << '\n';
-  print_undetermined(out, s);
-  if (!s.none.empty()) out << fmt::format("no standard errors and intervals: {}\n", s.none);
-  out << '\n';
-  if (s.none.empty()) out << fmt::format("standard errors: {}\n", s.covariance_in_words());
-  out << counted(fit.samples, "sample");
-  if (s.std_error.size() > 0)
-    out << fmt::format(", {}; condition number {}",
-                       counted(s.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
-                       std::isinf(s.condition_number) ? "infinite" : significant(s.condition_number, 3));
-  out << '\n';
-  out << fmt::format("{}: {}, {}, {}\n", to_string(fit.status), counted(fit.iterations, "iteration"),
-                     counted(fit.evaluations, "evaluation"), effort);
+  const Eigen::Index all = s.singular_values.size();
+  std::string values;
+  for (Eigen::Index k = 0; k < all; ++k) {
+    if (all > kMostValues && k == kMostValues / 2) values += ", ...", k = all - kMostValues / 2;
+    values += (values.empty() ? "" : ", ") + significant(s.singular_values(k), 3);
+  }
+  const bool tied = all < static_cast<Eigen::Index>(fit.parameters.size());  // by equations between the parameters
+  const std::string combinations =
+      tied ? fmt::format("{} of the {} that continuity leaves", s.rank, counted(all, "combination"))
+           : counted(s.rank, "combination");
+  const std::string words = fmt::format("the data determine {} of {}: singular values {}", combinations,
+                                        counted(fit.parameters.size(), "parameter"), values);
+  std::vector<std::string> parts;
+  for (Eigen::Index k = 0; k < s.weakest.size(); ++k)
+    if (std::abs(s.weakest(k)) > kPart) parts.push_back(fit.parameters[static_cast<std::size_t>(k)].name);
+  if (parts.size() < 2 || s.singular_values(s.rank - 1) > kCancelled) return words;
+  const std::string last = parts.back();
+  parts.pop_back();
+  return words + fmt::format("; the effects of {} and {} cancel but for {:.2g}", fmt::join(parts, ", "), last,
+                             s.singular_values(s.rank - 1));
 }
 
-void print_recovery(std::ostream& out, const Recovery& recovery) {
+void show_preflight(Run& run, const IdentificationResult& start) {
+  TextTable table({"parameter", "start", "predicted std error", "unit"});
+  for (const FittedParameter& p : start.parameters) {
+    run.result["preflight"]["parameters"][p.name] = {{"start", p.initial}, {"predicted_std_error", p.std_error}};
+    table.add({p.name, significant(p.initial), std::isfinite(p.std_error) ? significant(p.std_error, 3) : "-",
+               p.unit.empty() ? "-" : p.unit});
+  }
+  run.result["identifiability"] = identifiability_of(start.statistics);
+  run.context.out << '\n' << table.text();
+  for (const std::string& words : start.statistics.unidentifiable)
+    run.context.out << "not determined by the data: " << words << '\n';
+  run.context.out << "\npredicted at the start, with the sigmas as given; nothing was fitted\n";
+}
+
+void show_recovery(Run& run, const Recovery& recovery) {
   TextTable table({"recovery", "truth", "mean", "bias", "scatter", "95 % intervals that hold it", "unit"});
-  for (const RecoveredParameter& p : recovery.parameters)
+  Json& json = run.result["recovery"] = Json::object();
+  for (const RecoveredParameter& p : recovery.parameters) {
+    json[p.name] = {{"truth", p.truth},     {"mean", p.mean},   {"bias", p.bias()},
+                    {"scatter", p.scatter}, {"share", p.share}, {"fits", recovery.fits}};
     table.add({p.name, significant(p.truth, 9), significant(p.mean, 9), significant(p.bias(), 3),
                significant(p.scatter, 3), fmt::format("{:.1f} %", 100 * p.share), p.unit.empty() ? "-" : p.unit});
-  out << '\n' << table.text() << fmt::format("{} of simulated records\n", counted(recovery.fits, "fit"));
+  }
+  run.context.out << '\n' << table.text() << counted(recovery.fits, "fit") << " of simulated records\n";
 }
 
-void add_to_result(Json& result, const Recovery& recovery) {
-  result["recovery"] = Json::object();
-  for (const RecoveredParameter& p : recovery.parameters)
-    result["recovery"][p.name] = {{"truth", p.truth},     {"mean", p.mean},   {"bias", p.bias()},
-                                  {"scatter", p.scatter}, {"share", p.share}, {"fits", recovery.fits}};
-}
-
-void print_bootstrap(std::ostream& out, const IdentificationResult& fit, const Recovery& bootstrap) {
+void show_bootstrap(Run& run, const IdentificationResult& fit, const Recovery& bootstrap) {
   TextTable table({"bootstrap", "value", "std error", "of the table", "95 % interval", "unit"});
+  Json& json = run.result["bootstrap"] = Json::object();
   for (std::size_t k = 0; k < bootstrap.parameters.size(); ++k) {
     const RecoveredParameter& p = bootstrap.parameters[k];
+    json[p.name] = {
+        {"std_error", p.scatter}, {"ci95", {p.ci95[0], p.ci95[1]}}, {"bias", p.bias()}, {"fits", bootstrap.fits}};
     table.add({p.name, significant(p.truth, 9), significant(p.scatter, 3), significant(fit.parameters[k].std_error, 3),
                fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1])), p.unit.empty() ? "-" : p.unit});
   }
-  out << '\n' << table.text() << fmt::format("{} of resampled residuals\n", counted(bootstrap.fits, "fit"));
-}
-
-void add_bootstrap(Json& result, const Recovery& bootstrap) {
-  result["bootstrap"] = Json::object();
-  for (const RecoveredParameter& p : bootstrap.parameters)
-    result["bootstrap"][p.name] = {
-        {"std_error", p.scatter}, {"ci95", {p.ci95[0], p.ci95[1]}}, {"bias", p.bias()}, {"fits", bootstrap.fits}};
+  run.context.out << '\n' << table.text() << counted(bootstrap.fits, "fit") << " of resampled residuals\n";
 }
 
 void add_to_result(Json& result, const IdentificationResult& fit) {

@@ -1,26 +1,25 @@
 // The results of an identification, for people on standard output and for scripts in result.json and CSV files.
 #pragma once
 
-#include <ostream>
 #include <string>
 
-#include "app/files/result_json.hpp"
 #include "app/results/trajectory_csv.hpp"
+#include "app/run/run.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
 
 namespace mbsopt::inline app {
 
-// The report before the fit: what the data would determine at the start with the given sigmas.
-void print_preflight(std::ostream& out, const IdentificationResult& start);
-void add_preflight(Json& result, const IdentificationResult& start);  // preflight.parameters; identifiability
+// These print their argument, and add it to the result of the run. Before the fit: what the data would determine at the
+// start with the given sigmas. After it: fits of simulated records, and of resampled residuals.
+void show_preflight(Run& run, const IdentificationResult& start);
+void show_recovery(Run& run, const Recovery& recovery);
+void show_bootstrap(Run& run, const IdentificationResult& fit, const Recovery& bootstrap);
 
-// effort is the text of effort() in multistart.hpp.
-void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort);
-void print_recovery(std::ostream& out, const Recovery& recovery);
-void add_to_result(Json& result, const Recovery& recovery);
-void print_bootstrap(std::ostream& out, const IdentificationResult& fit, const Recovery& bootstrap);
-void add_bootstrap(Json& result, const Recovery& bootstrap);
+// "the data determine 4 combinations of 4 parameters: singular values 1.8, 0.807, 0.335, 0.0239; the effects of c and T
+// cancel but for 0.024". With continuity it is "7 of the 7 combinations that continuity leaves of 13 parameters".
+std::string determined_in_words(const IdentificationResult& fit);
+
 // parameters, correlation, covariance, experiments, optimizer, statistics, identifiability, profiles
 void add_to_result(Json& result, const IdentificationResult& fit);
 

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
-#include "app/terminal/text_table.hpp"
 #include "core/expression/dimension_inference.hpp"
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/type_table.hpp"
@@ -107,21 +107,46 @@ std::string shown_unit(const ObjectiveUnits& units, const std::string& objective
   return found == units.end() || found->second.empty() ? kUnknownUnit : found->second;
 }
 
-std::string after_value(const ObjectiveUnits& units, const std::string& objective) {
-  const std::string unit = shown_unit(units, objective);
-  return unit == "-" || unit == kUnknownUnit ? "" : " " + unit;
-}
-
 Json objective_json(double value, const std::optional<double>& true_value) {
   Json json{{"value", value}};
   if (true_value) json["true_value"] = *true_value;
   return json;
 }
 
-std::string objective_line(const std::string& name, double value, const std::optional<double>& true_value,
-                           const ObjectiveUnits& units) {
-  return fmt::format("{} = {}{}{}\n", name, significant(value, 12), after_value(units, name),
-                     true_value ? fmt::format("   (true extreme: {})", significant(*true_value, 10)) : "");
+std::string unit_of(const Json& quantity) { return quantity.value("unit", kUnknownUnit); }
+
+std::string after_number(const Json& quantity) {
+  const std::string unit = quantity.value("unit", "");
+  return unit.empty() || unit == "-" ? "" : " " + unit;
+}
+
+std::string objective_line(const std::string& name, const Json& objective) {
+  const Json extreme = objective.value("true_value", Json());
+  return fmt::format("{} = {}{}{}\n", name, cell(objective.at("value"), 12), after_number(objective),
+                     extreme.is_null() ? "" : fmt::format("   (true extreme: {})", cell(extreme, 10)));
+}
+
+Json objective_rows(const Json& result) {
+  Json rows = Json::object();
+  const auto add = [&](const Json& part, const std::string& load_case) {
+    const Json objectives = part.value("objectives", Json::object());  // items() refers to it
+    for (const auto& [name, objective] : objectives.items()) {
+      Json& row = rows[name + load_case] = objective;
+      row["unit"] = objective.contains("unit") ? objective["unit"] : Json(unit_of(rows.value(name, Json::object())));
+      const double x = number_of(row, objective.contains("true_value") ? "true_value" : "value");
+      const double margin = std::fmin(x - number_of(row, "lower"), number_of(row, "upper") - x);
+      if (std::isfinite(margin)) row["margin"] = margin;
+    }
+  };
+  add(result, "");
+  const Json cases = result.value("cases", Json::object());
+  for (const auto& [name, of_case] : cases.items()) add(of_case, fmt::format(" ({})", name));
+  return rows;
+}
+
+TextTable objective_table(const Json& result) {
+  return table_of(objective_rows(result),
+                  {{"objective"}, {"value", "value", 10}, {"unit", "unit"}, {"true extreme", "true_value", 10, true}});
 }
 
 void add_units(Json& result, const ObjectiveUnits& units) {

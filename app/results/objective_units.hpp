@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app/files/result_json.hpp"
+#include "app/terminal/text_table.hpp"
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt::inline app {
@@ -29,13 +30,18 @@ ObjectiveUnits objective_units(const Problem& problem);
 // Returns the unit for a table or an axis, or kUnknownUnit.
 std::string shown_unit(const ObjectiveUnits& units, const std::string& objective);
 
-// " m^2 s" to follow a value; empty for a number or an unknown unit.
-std::string after_value(const ObjectiveUnits& units, const std::string& objective);
-
 Json objective_json(double value, const std::optional<double>& true_value);
+
+// An entry of result["objectives"] or result["parameters"]: its unit, or kUnknownUnit.
+std::string unit_of(const Json& quantity);
+// " m^2 s" to follow its value; empty for a number or an unknown unit.
+std::string after_number(const Json& quantity);
 // "peak = 0.21 m   (true extreme: 0.213)", and the end of the line.
-std::string objective_line(const std::string& name, double value, const std::optional<double>& true_value,
-                           const ObjectiveUnits& units);
+std::string objective_line(const std::string& name, const Json& objective);
+
+// The objectives of a result and of its load cases, "peak" and "peak (cold)", as rows of a table. Each has a unit, and
+// one with limits the margin to the nearer one, negative beyond it.
+Json objective_rows(const Json& result);
 
 template <class Named>
 std::vector<std::string> names_of(const std::vector<Named>& list) {
@@ -50,6 +56,9 @@ Json by_name(const std::vector<std::string>& names, const auto& values) {
   for (std::size_t k = 0; k < names.size(); ++k) json[names[k]] = values(static_cast<Eigen::Index>(k));
   return json;
 }
+
+// objective, value, unit, and the true extreme of smooth ones
+TextTable objective_table(const Json& result);
 
 // Adds "unit" to each objective of a result and of its load cases whose unit is known.
 void add_units(Json& result, const ObjectiveUnits& units);

@@ -1,14 +1,14 @@
-// The results of `tradeoff`: its table by the names of its columns, which docs/tradeoffs.md explains, and what
-// result.json and standard output show of it. tradeoff.csv holds all columns, the others take those that they show.
+// The table of `tradeoff` by the names of its columns, which docs/tradeoffs.md explains. tradeoff.csv holds all
+// columns; result.json, the terminal and the report take those that they show.
 //
 //   columns_of(row, quantities).at("rhs_evaluations")   // 204
 #pragma once
 
+#include <initializer_list>
 #include <string>
 #include <vector>
 
-#include "app/run/run.hpp"
-#include "optim/tradeoff/advice.hpp"
+#include "app/files/json_text.hpp"
 #include "optim/tradeoff/tradeoff.hpp"
 
 namespace mbsopt::inline app {
@@ -43,18 +43,8 @@ std::string duration_text(double seconds);  // "12.3 ms", "1.5 s"
 // "1.2e-04", "-" of an error that is not there; "< 4.3e-06" below what the reference is certain of.
 std::string error_text(double error, double certificate = 0);
 
-// Adds the methods, their difference and the right values, with a warning if these are uncertain.
-void add_reference(Run& run, const TradeoffReference& reference);
-// Adds the scene's own settings and the defaults.
-void add_given_settings(Run& run, const Tradeoff& tradeoff);
-// Adds the errors in the sum of squares of identify, of the scene's own settings and of the defaults.
-void add_fit_errors(Run& run, const FitErrors& fit);
-// Adds advice per quantity, and for the task of the file, a design or an identification, if it has one.
-void add_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser* adviser);
-void add_outcomes(Run& run, const Tradeoff& tradeoff);  // how many were measured; what was not, and why
-// Adds the choice of --apply. The run fails if there is nothing to choose.
-void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& advice, const FitErrors* fit);
-
-void add_penalty_study(Run& run, const PenaltyStudy& study);
+// Adds the columns of a row that have a value.
+void add_columns(Json& json, const Tradeoff& tradeoff, const TradeoffRow& row,
+                 std::initializer_list<const char*> names);
 
 }  // namespace mbsopt::inline app

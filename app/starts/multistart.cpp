@@ -7,7 +7,7 @@
 #include <iterator>
 #include <tuple>
 
-#include "app/report/report_parts.hpp"
+#include "app/report/run_page.hpp"
 #include "app/starts/distinct_optima.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
@@ -42,7 +42,10 @@ std::string text_of(const Json& record, const std::string& key) {
 // Prints a table of the first ones.
 template <class Row>
 void print_first(std::ostream& out, TextTable table, std::size_t count, const Row& row) {
-  for (std::size_t i = 0; i < std::min(kPrinted, count); ++i) table.add(row(i));
+  for (std::size_t i = 0; i < std::min(kPrinted, count); ++i) {
+    const std::vector<std::string> cells = row(i);
+    table.add({cells.begin(), cells.end()});
+  }
   out << '\n' << table.text();
   if (count > kPrinted) out << fmt::format("... and {} more, in result.json\n", count - kPrinted);
 }

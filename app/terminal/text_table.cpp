@@ -27,48 +27,75 @@ std::string padded(const std::string& cell, std::size_t to, bool right) {
 
 }  // namespace
 
-void TextTable::add(std::vector<std::string> row) {
-  row.resize(header_.size());
-  rows_.push_back(std::move(row));
-}
-
-std::string TextTable::text(const std::vector<std::string>& unless_empty) const {
+std::string TextTable::text() const {
   const std::size_t columns = header_.size();
-  const auto is_shown = [&](std::size_t c) {
-    return std::ranges::find(unless_empty, header_[c]) == unless_empty.end() ||
-           std::ranges::any_of(rows_, [c](const auto& row) { return !row[c].empty(); });
-  };
-  std::vector<bool> shown(columns);
-  for (std::size_t c = 0; c < columns; ++c) shown[c] = is_shown(c);
+  const auto cell_of = [](const TableRow& row, std::size_t c) { return c < row.size() ? row[c].text : std::string(); };
   std::vector<std::size_t> widths(columns);
-  std::vector<bool> numeric(columns, true);
-  for (std::size_t c = 0; c < columns; ++c) widths[c] = width(header_[c]);
-  for (const auto& row : rows_) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      widths[c] = std::max(widths[c], width(row[c]));
-      if (!looks_like_a_number(row[c])) numeric[c] = false;
+  std::vector<bool> numeric(columns, !rows_.empty());
+  for (std::size_t c = 0; c < columns; ++c) {
+    widths[c] = width(header_[c]);
+    for (const TableRow& row : rows_) {
+      widths[c] = std::max(widths[c], width(cell_of(row, c)));
+      if (!looks_like_a_number(cell_of(row, c))) numeric[c] = false;
     }
   }
-  const auto line = [&](const std::vector<std::string>& cells) {
-    std::string out;
-    for (std::size_t c = 0; c < columns; ++c) {
-      if (!shown[c]) continue;
-      out += (c == 0 ? "" : "  ") + padded(cells[c], widths[c], numeric[c] && !rows_.empty());
-    }
-    out.erase(out.find_last_not_of(' ') + 1);
-    return out + "\n";
+  std::string text;
+  const auto add_line = [&](const TableRow& row) {
+    for (std::size_t c = 0; c < columns; ++c)
+      text += (c == 0 ? "" : "  ") + padded(cell_of(row, c), widths[c], numeric[c]);
+    text.erase(text.find_last_not_of(' ') + 1);
+    text += '\n';
   };
-  std::string text = line(header_);
-  for (const auto& row : rows_) text += line(row);
+  add_line({header_.begin(), header_.end()});
+  for (const TableRow& row : rows_) add_line(row);
   return text;
+}
+
+TextTable table_of(const Json& rows, const std::vector<Column>& columns) {
+  std::vector<Column> shown;
+  std::vector<std::string> header;
+  const auto pointer = [](const Column& column) { return Json::json_pointer("/" + column.key); };
+  for (const Column& column : columns) {
+    const auto has_it = [&](const Json& row) {
+      return row.contains(pointer(column)) && !row[pointer(column)].is_null();
+    };
+    if (column.if_any && std::none_of(rows.begin(), rows.end(), has_it)) continue;
+    header.push_back(column.header), shown.push_back(column);
+  }
+  TextTable table(header);
+  for (const auto& [name, entries] : rows.items()) {
+    TableRow& row = table.add({});
+    for (const Column& column : shown)
+      row.push_back(column.key.empty() ? rows.is_array() ? std::to_string(table.rows().size()) : name
+                                       : number_cell(entries.value(pointer(column), Json()), column.digits));
+  }
+  return table;
 }
 
 std::string significant(double value, int digits) {
   return std::isnan(value) ? "-" : fmt::format("{:.{}g}", value, digits);
 }
 
-std::string or_blank(const std::optional<double>& value, int digits) {
-  return value ? significant(*value, digits) : std::string();
+std::string cell(const Json& value, int digits) {
+  if (value.is_number_integer()) return std::to_string(value.get<long>());
+  if (value.is_number()) return significant(value.get<double>(), digits);
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  if (!value.is_array()) return "-";
+  std::string text;
+  for (const Json& element : value) text += (text.empty() ? "" : ", ") + cell(element, digits);
+  return text.empty() ? "none" : text;
+}
+
+TableCell number_cell(const Json& value, int digits) {
+  constexpr int kBrief = 7;  // digits in a page
+  if (value.is_null()) return "";
+  if (value == "") return "-";
+  TableCell shown = cell(value, digits);
+  if (!value.is_number_float() || !std::isfinite(value.get<double>())) return shown;
+  shown.full = fmt::format("{}", value.get<double>());
+  if (digits > kBrief) shown.brief = cell(value, kBrief);
+  return shown;
 }
 
 }  // namespace mbsopt::inline app

@@ -54,7 +54,8 @@ TEST_CASE("where parts have no unit or do not fit each other, that of the object
   CHECK(units.at("root").empty());
   CHECK(shown_unit(units, "mixed") == kUnknownUnit);
   CHECK(shown_unit(units, "mixed") != shown_unit(units_with(R"({"ratio": {"terminal": "x/goal"}})"), "ratio"));
-  CHECK(after_value(units, "mixed").empty());
+  CHECK(objective_line("mixed", {{"value", 1}}) == "mixed = 1\n");
+  CHECK(objective_line("miss", {{"value", 1}, {"unit", "m^2"}}) == "miss = 1 m^2\n");
 }
 
 TEST_CASE("units stand beside the values of a result and of its load cases", "[results]") {
@@ -65,4 +66,18 @@ TEST_CASE("units stand beside the values of a result and of its load cases", "[r
   CHECK(result["objectives"]["a"]["unit"] == "m");
   CHECK_FALSE(result["objectives"]["b"].contains("unit"));
   CHECK(result["cases"]["cold"]["objectives"]["a"]["unit"] == "m");
+}
+
+TEST_CASE("a table of objectives has those of load cases, with their units and margins", "[results]") {
+  Json result;
+  result["objectives"]["a"] = {{"value", 1}, {"unit", "m"}, {"lower", nullptr}, {"upper", 1.5}};
+  result["cases"]["cold"]["objectives"]["a"] = {{"value", 2}, {"true_value", 2.25}, {"lower", 2.5}, {"upper", nullptr}};
+  const Json rows = objective_rows(result);
+  CHECK(rows.at("a").at("margin") == 0.5);
+  CHECK(rows.at("a (cold)").at("margin") == -0.25);
+  CHECK(rows.at("a (cold)").at("unit") == "m");
+  CHECK(objective_table(result).text() ==
+        "objective  value  unit  true extreme\n"
+        "a              1  m\n"
+        "a (cold)       2  m             2.25\n");
 }

@@ -1,4 +1,4 @@
-#include "app/report/report_parts.hpp"
+#include "app/report/run_page.hpp"
 
 #include <catch2/catch.hpp>
 

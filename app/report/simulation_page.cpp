@@ -2,9 +2,7 @@
 
 #include <algorithm>
 
-#include "app/report/motion_plots.hpp"
-#include "app/report/report_parts.hpp"
-#include "app/report/run_report.hpp"
+#include "app/report/run_page.hpp"
 #include "app/results/objective_units.hpp"
 #include "core/expression/counted.hpp"
 
@@ -58,12 +56,9 @@ void add_efforts(HtmlPage& page, const Scene& scene, const MotionParts& parts) {
 
 }  // namespace
 
-std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
-                              const MotionParts& parts) {
-  HtmlPage page(report_title(result));
-  add_motion_verdict(page, result, trajectory);
-  add_status(page, result);
-  add_objectives(page, result);
+void add_simulated_motion(RunPage& page, const Scene& scene, const Trajectory& trajectory, const MotionParts& parts) {
+  add_motion_verdict(page, page.run.result, trajectory);
+  add_objectives(page);
   page.heading("Motion");
   add_motion(page, {{scene.name, scene, trajectory, false, parts.targets, parts.forces}});
   for (LinePlot& plot : motion_plots(scene, trajectory)) {
@@ -72,8 +67,7 @@ std::string simulation_report(const Scene& scene, const Json& result, const Traj
   }
   add_efforts(page, scene, parts);
   add_extremes(page, scene, trajectory);
-  add_simulation(page, scene, result);
-  return finished(page, result);
+  add_simulation(page, scene);
 }
 
 }  // namespace mbsopt::inline app

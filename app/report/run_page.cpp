@@ -1,4 +1,4 @@
-#include "app/report/report_parts.hpp"
+#include "app/report/run_page.hpp"
 
 #include <fmt/format.h>
 
@@ -9,10 +9,7 @@
 
 #include "app/report/line_plot.hpp"
 #include "app/report/mechanism_drawing.hpp"
-#include "app/report/motion_plots.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/run/run.hpp"
-#include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "core/expression/dimension.hpp"
 
@@ -40,40 +37,18 @@ bool all_positive(const std::vector<double>& values) {
   return std::ranges::all_of(values, [](double v) { return v > 0; });
 }
 
+void add_provenance(HtmlPage& page, const Json& result) {
+  page.heading("Where this comes from");
+  const Json& origin = result.at("provenance");
+  page.paragraph("The command that repeats this run:");
+  page.code(cell(origin.at("command_line")));
+  std::vector<TableRow> rows{{"sha256 of the problem file", cell(origin.at("input_sha256"))},
+                             {"mbsopt", cell(result.at("version"))}};
+  for (const auto& [name, version] : origin.at("libraries").items()) rows.push_back({name, cell(version)});
+  page.table({"", ""}, rows);
+}
+
 }  // namespace
-
-std::string cell(const Json& value, int digits) {
-  if (value.is_number_integer()) return std::to_string(value.get<long>());
-  if (value.is_number()) return significant(value.get<double>(), digits);
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  if (!value.is_array()) return "-";
-  std::string text;
-  for (const Json& element : value) text += (text.empty() ? "" : ", ") + cell(element, digits);
-  return text.empty() ? "none" : text;
-}
-
-TableCell number_cell(const Json& value, int digits) {
-  if (!value.is_number_float() || !std::isfinite(value.get<double>())) return cell(value, digits);
-  return {significant(value.get<double>(), digits), fmt::format("{}", value.get<double>())};
-}
-
-TableCell rounded_cell(const Json& value, const Json& error) {
-  constexpr int kMostDigits = 12;
-  if (!value.is_number() || !error.is_number() || !(error.get<double>() > 0)) return number_cell(value);
-  const double v = std::abs(value.get<double>()), e = error.get<double>();
-  if (!std::isfinite(e) || !(v > 0)) return number_cell(value);
-  // This leaves two digits of the error.
-  const double digits = std::floor(std::log10(v)) - std::floor(std::log10(e)) + 2;
-  return number_cell(value, static_cast<int>(std::clamp(digits, 2.0, static_cast<double>(kMostDigits))));
-}
-
-std::string unit_of(const Json& objective) { return objective.value("unit", kUnknownUnit); }
-
-std::string after_number(const Json& quantity) {
-  const std::string unit = quantity.value("unit", "");
-  return unit.empty() || unit == "-" ? "" : " " + unit;
-}
 
 std::vector<std::string> objective_values(const Json& objectives) {
   std::vector<std::string> values;
@@ -92,25 +67,47 @@ std::string unit_per(const std::string& unit, const std::string& divisor) {
   return found.is_none() ? "-" : to_string(found);
 }
 
-std::string report_title(const Json& result) {
-  return result.at("problem").get<std::string>() + ": " + result.at("command").get<std::string>();
+RunPage::RunPage(Run& its_run) : HtmlPage(its_run.problem.scene.name + ": " + its_run.context.command), run(its_run) {}
+
+void RunPage::print(const TextTable& shown) { run.context.out << '\n' << shown.text(); }
+
+void RunPage::both(const TextTable& shown) {
+  print(shown);
+  table(shown);
 }
 
-void add_status(HtmlPage& page, const Json& result) {
+void RunPage::say(std::string_view words) {
+  run.context.out << words << '\n';
+  note(words);
+}
+
+void RunPage::write() {
+  const Json& result = run.result;
   const std::string status = result.value("status", ""), message = result.value("message", "");
   if (status == "failed") {
-    page.banner("This run failed: " + message);
+    banner("This run failed: " + message);
     if (result.contains("last_good_time"))
-      page.paragraph(fmt::format("The motion is good up to {:.6g} s.", result.at("last_good_time").get<double>()));
+      remark(fmt::format("The motion is good up to {:.6g} s.", result.at("last_good_time").get<double>()));
   } else if (status == "interrupted") {
-    page.banner("This run was " + message + ".");
+    banner("This run was " + message + ".");
   }
-  if (result.contains("accuracy"))
-    page.paragraph("Accuracy: " + result.at("accuracy").at("in_words").get<std::string>());
-  for (const Json& warning : result.at("warnings")) page.warning(warning.get<std::string>());
+  if (result.contains("accuracy")) remark("Accuracy: " + result.at("accuracy").at("in_words").get<std::string>());
+  for (const Json& words : result.at("warnings")) warning(words.get<std::string>());
+  if (result.contains("model")) {
+    heading("Mechanism");
+    add_entries(*this, result.at("model"),
+                {{"bodies", "bodies"},
+                 {"equations", "constraint equations"},
+                 {"rank", "of rank"},
+                 {"degrees_of_freedom", "degrees of freedom"},
+                 {"redundant", "redundant"}});
+  }
+  add_provenance(*this, result);
+  run.write("report.html", text());
 }
 
-void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
+void add_simulation(RunPage& page, const Scene& scene) {
+  const Json& result = page.run.result;
   if (!result.contains("simulation")) return;
   page.heading("Simulation");
   add_entries(page, result.at("simulation"),
@@ -128,33 +125,11 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
                 2}});
 }
 
-double number_of(const Json& object, const std::string& key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number() ? found->get<double>() : NAN;
-}
-
-bool has_true_values(const Json& result) {
-  const auto has_one = [](const Json& objectives) {
-    return std::any_of(objectives.begin(), objectives.end(), [](const Json& o) { return o.contains("true_value"); });
-  };
-  const Json cases = result.value("cases", Json::object());
-  return has_one(result.at("objectives")) || std::any_of(cases.begin(), cases.end(), [&](const Json& of_case) {
-           return of_case.contains("objectives") && has_one(of_case["objectives"]);
-         });
-}
-
-void add_objectives(HtmlPage& page, const Json& result) {
+void add_objectives(RunPage& page) {
+  const Json& result = page.run.result;
   if (!result.contains("objectives") || result.at("objectives").empty()) return;
   page.heading("Objectives");
-  std::vector<TableRow> rows;
-  std::vector<std::string> header{"objective", "value", "unit"};
-  const bool any_smooth = has_true_values(result);
-  if (any_smooth) header.push_back("true extreme");
-  for (const auto& [name, objective] : result.at("objectives").items()) {
-    rows.push_back({name, number_cell(objective.at("value")), unit_of(objective)});
-    if (any_smooth) rows.back().push_back(number_cell(objective.value("true_value", Json())));
-  }
-  page.table(header, rows);
+  page.table(objective_table(result));
 }
 
 double Between::operator()(double value) const {
@@ -168,8 +143,7 @@ std::optional<Between> bounds_of(const Scene& scene, const std::string& name, co
   return Between{lower, upper, parameter != scene.parameters.end() && parameter->scale != ParameterScale::linear};
 }
 
-void add_convergence(HtmlPage& page, const Scene& scene, const Trajectory& history, const Json& parameters,
-                     const std::string& unit) {
+void add_convergence(RunPage& page, const Trajectory& history, const std::string& unit) {
   if (history.rows.size() < 2) return;
   page.heading("Convergence");
   for (const char* name : {"objective", "cost", "infeasibility"}) {
@@ -189,10 +163,10 @@ void add_convergence(HtmlPage& page, const Scene& scene, const Trajectory& histo
                    .whole_x = true,
                    .limits = {{"lower bound", 0, false}, {"upper bound", 1, true}}};
   LinePlot free{.title = "Parameters", .x_label = "iteration", .y_label = "value/initial value [-]", .whole_x = true};
-  for (const auto& [name, p] : parameters.items()) {
+  for (const auto& [name, p] : page.run.result.at("parameters").items()) {
     std::optional<PlotSeries> series = series_of(history, name);
     if (!series) continue;
-    const std::optional<Between> between = bounds_of(scene, name, p);
+    const std::optional<Between> between = bounds_of(page.run.problem.scene, name, p);
     const double initial = p.at("initial").get<double>();
     if (!between && initial == 0) continue;
     for (double& value : series->y) value = between ? (*between)(value) : value / initial;
@@ -255,7 +229,8 @@ std::string starts_in_words(const Json& multistart) {
                      multistart.at("waterfall").at(0).at("status").get<std::string>());
 }
 
-void add_multistart(HtmlPage& page, const Scene& scene, const Json& result) {
+void add_multistart(RunPage& page) {
+  const Json& result = page.run.result;
   if (!result.contains("multistart") || !result.at("multistart").contains("waterfall")) return;
   const Json& multistart = result.at("multistart");
   page.heading("Starts");
@@ -265,28 +240,27 @@ void add_multistart(HtmlPage& page, const Scene& scene, const Json& result) {
                 .y_label = fmt::format("objective [{}]", minimised_unit(result)),
                 .whole_x = true};
   PlotSeries& series = plot.series.emplace_back(PlotSeries{"objective", {}, {}, Mark::points});
-  std::vector<TableRow> rows;
   for (const Json& record : multistart.at("waterfall")) {
-    const Json objective = record.value("objective", Json());
-    if (objective.is_number()) {
-      series.x.push_back(static_cast<double>(series.x.size() + 1));
-      series.y.push_back(objective.get<double>());
-    }
-    rows.push_back({cell(record.at("start")), number_cell(objective),
-                    number_cell(record.value("infeasibility", Json()), 2),
-                    number_cell(record.value("optimality", Json()), 2), cell(record.at("message"))});
+    const double objective = number_of(record, "objective");
+    if (std::isnan(objective)) continue;
+    series.x.push_back(static_cast<double>(series.x.size() + 1));
+    series.y.push_back(objective);
   }
   plot.logarithmic_y = all_positive(series.y);
   if (!series.y.empty()) page.plot(plot);
-  const LinePlot ends = parallel_coordinates(scene, multistart, result.value("parameters", Json::object()));
+  const LinePlot ends =
+      parallel_coordinates(page.run.problem.scene, multistart, result.value("parameters", Json::object()));
   if (ends.series.size() > 1 && ends.x_names.size() > 1) page.plot(ends);
-  page.table({"start", "objective", "infeasibility", "optimality", "outcome"}, rows);
-  if (multistart.at("optima").empty()) return;
-  std::vector<TableRow> optima;
-  for (const Json& optimum : multistart.at("optima"))
-    optima.push_back({cell(optimum.at("start")), cell(optimum.at("found_by")), number_cell(optimum.at("objective"))});
+  page.table(table_of(multistart.at("waterfall"), {{"start", "start"},
+                                                   {"objective", "objective", 6},
+                                                   {"infeasibility", "infeasibility", 2},
+                                                   {"optimality", "optimality", 2},
+                                                   {"outcome", "message"}}));
+  const Json& optima = multistart.at("optima");
+  if (optima.empty()) return;
   page.paragraph(fmt::format("Distinct optima: {}.", optima.size()));
-  page.table({"best start", "starts that ended there", "objective"}, optima);
+  page.table(table_of(
+      optima, {{"best start", "start"}, {"starts that ended there", "found_by"}, {"objective", "objective", 6}}));
 }
 
 void add_motion(HtmlPage& page, const std::vector<MovingState>& states) {
@@ -304,31 +278,6 @@ void add_motion(HtmlPage& page, const std::vector<MovingState>& states) {
       mechanism_drawing("At the end", plane.axes, ends);
   Json motion = motion_scene(plane, states);
   motion.is_null() ? page.drawing(stills) : page.motion(std::move(motion), stills);
-}
-
-void add_provenance(HtmlPage& page, const Json& result) {
-  page.heading("Where this comes from");
-  const Json& origin = result.at("provenance");
-  page.paragraph("The command that repeats this run:");
-  page.code(cell(origin.at("command_line")));
-  std::vector<TableRow> rows{{"sha256 of the problem file", cell(origin.at("input_sha256"))},
-                             {"mbsopt", cell(result.at("version"))}};
-  for (const auto& [name, version] : origin.at("libraries").items()) rows.push_back({name, cell(version)});
-  page.table({"", ""}, rows);
-}
-
-std::string finished(HtmlPage& page, const Json& result) {
-  if (result.contains("model")) {
-    page.heading("Mechanism");
-    add_entries(page, result.at("model"),
-                {{"bodies", "bodies"},
-                 {"equations", "constraint equations"},
-                 {"rank", "of rank"},
-                 {"degrees_of_freedom", "degrees of freedom"},
-                 {"redundant", "redundant"}});
-  }
-  add_provenance(page, result);
-  return page.text();
 }
 
 }  // namespace mbsopt::inline app

@@ -1,0 +1,77 @@
+// The page report.html of a run: its input, its numbers, its plots. What a command prints, too, goes to both by one
+// call. The page has no time of day and no seconds of computing, so the same inputs give the same bytes; only that of
+// `tradeoff` shows seconds, because it measures them.
+//
+//   RunPage page(run);
+//   page.heading("Objectives"), page.both(objective_table(run.result));
+//   page.write();
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/report/html_page.hpp"
+#include "app/report/motion_plots.hpp"
+#include "app/report/motion_scene.hpp"
+#include "app/run/run.hpp"
+
+namespace mbsopt::inline app {
+
+class RunPage : public HtmlPage {
+ public:
+  explicit RunPage(Run& run);
+  Run& run;
+
+  void print(const TextTable& shown);  // at the terminal, after an empty line
+  void both(const TextTable& shown);   // there, and in the page
+  void say(std::string_view words);    // likewise: a line, and small print
+  // Writes the page. Its top says how the run ended, with all warnings; its end has the mechanism and the provenance.
+  void write();
+};
+
+std::vector<std::string> objective_values(const Json& objectives);          // "path = 1.23 m^2 s", ...
+std::string unit_per(const std::string& unit, const std::string& divisor);  // "N/m", "m" to "N/m^2"
+
+// Sections of the page.
+void add_objectives(RunPage& page);                      // name and value
+void add_simulation(RunPage& page, const Scene& scene);  // steps, violations, energy
+// The derivatives of all objectives in all parameters, and what a change of each parameter does.
+TextTable gradient_table(const Run& run);
+void add_gradients(RunPage& page);
+// Objective, infeasibility and parameters over iterations: the columns of history.csv. unit is that of the objective.
+void add_convergence(RunPage& page, const Trajectory& history, const std::string& unit = "-");
+void add_multistart(RunPage& page);  // the waterfall, where there is one
+// The moving mechanism, above drawings of its start and end that replace it without a script.
+void add_motion(HtmlPage& page, const std::vector<MovingState>& states);
+
+// The parts of a motion beside its trajectory; each may be empty.
+struct MotionParts {
+  std::vector<PointTarget> targets = {};
+  Trajectory forces = {};                  // of joints (joint_forces.hpp)
+  Trajectory efforts = {};                 // t, then the force or torque of each drive by name; of kinematics
+  std::vector<PlotInstant> instants = {};  // [s] marked in all plots over time
+};
+// All of a simulation: verdict, objectives, motion, plots, sensors, steps.
+void add_simulated_motion(RunPage& page, const Scene& scene, const Trajectory& trajectory,
+                          const MotionParts& parts = {});
+
+// "all 10 starts" or "3 of 10 starts" of the entry "multistart".
+std::string counted_starts(const Json& multistart);
+// "all 10 starts, seed 7: 2 at the best optimum", "... : the best one has not converged (iteration_limit)".
+std::string starts_in_words(const Json& multistart);
+
+// "optimum" if the optimiser converged, else "best point": the end of its search. status: as in result.json.
+const char* end_of_search(std::string_view status);
+
+// The place of a value between the bounds of a parameter, from 0 to 1, by its logarithm if that is its scale.
+struct Between {
+  double lower = 0, upper = 1;
+  bool logarithmic = false;
+  double operator()(double value) const;
+};
+// None without two bounds. `name` may be "run1.k"; p is an entry of result["parameters"].
+std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p);
+inline constexpr const char* kBetween = "place between the bounds, on the scale of the parameter [-]";
+
+}  // namespace mbsopt::inline app
