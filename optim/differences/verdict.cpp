@@ -3,20 +3,10 @@
 #include <cmath>
 
 namespace mbsopt::inline optim {
+
 std::string_view to_string(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::agrees:
-      return "agrees";
-    case Verdict::buried:
-      return "within its error";
-    case Verdict::zero:
-      return "zero";
-    case Verdict::failed:
-      return "FAILED";
-    case Verdict::disagrees:
-      break;
-  }
-  return "DISAGREES";
+  constexpr std::string_view kNames[] = {"agrees", "within its error", "zero", "FAILED", "DISAGREES"};
+  return kNames[static_cast<std::size_t>(verdict)];
 }
 
 Verdict verdict_of(double found, double error, double expected, double entry, double threshold) {

@@ -12,7 +12,8 @@ enum class Verdict {
   failed,  // the differences could not be evaluated
   disagrees,
 };
-std::string_view to_string(Verdict verdict);  // "agrees", "within its error", "zero", "FAILED", "DISAGREES"
+std::string_view to_string(
+    Verdict verdict);  // in this order: "agrees", "within its error", "zero", "FAILED", "DISAGREES"
 // Estimates of errors have the right size but are no bounds. A difference within some times of them is explained.
 inline constexpr double kEstimateTrust = 10;
 

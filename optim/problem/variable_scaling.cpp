@@ -39,51 +39,22 @@ double linear_scale(const Parameter& p, double felt) {
 }  // namespace
 
 double VariableScaling::Variable::to_x(double rho) const {
-  switch (scale) {
-    case ParameterScale::log:
-      return std::log(rho);
-    case ParameterScale::log10:
-      return std::log10(rho);
-    case ParameterScale::linear:
-      break;
-  }
-  return rho / s;
+  return scale == ParameterScale::linear ? rho / s : scale == ParameterScale::log ? std::log(rho) : std::log10(rho);
 }
 
 double VariableScaling::Variable::to_rho(double x) const {
-  switch (scale) {
-    case ParameterScale::log:
-      return std::exp(x);
-    case ParameterScale::log10:
-      return std::pow(10, x);
-    case ParameterScale::linear:
-      break;
-  }
-  return s * x;
+  return scale == ParameterScale::linear ? s * x : scale == ParameterScale::log ? std::exp(x) : std::pow(10, x);
 }
 
+// d rho/dx = a rho on a logarithmic scale
 double VariableScaling::Variable::rho_x(double x) const {
-  switch (scale) {
-    case ParameterScale::log:
-      return std::exp(x);
-    case ParameterScale::log10:
-      return std::numbers::ln10 * std::pow(10, x);
-    case ParameterScale::linear:
-      break;
-  }
-  return s;
+  const double a = scale == ParameterScale::log ? 1 : std::numbers::ln10;
+  return scale == ParameterScale::linear ? s : a * to_rho(x);
 }
 
 double VariableScaling::Variable::rho_xx(double x) const {
-  switch (scale) {
-    case ParameterScale::log:
-      return std::exp(x);
-    case ParameterScale::log10:
-      return std::numbers::ln10 * std::numbers::ln10 * std::pow(10, x);
-    case ParameterScale::linear:
-      break;
-  }
-  return 0;
+  const double a = scale == ParameterScale::log ? 1 : std::numbers::ln10;
+  return scale == ParameterScale::linear ? 0 : a * a * to_rho(x);
 }
 
 bool is_scaled_by_range(const Parameter& p) {
@@ -105,28 +76,17 @@ VariableScaling::VariableScaling(const std::vector<Parameter>& parameters, const
   }
 }
 
-Eigen::VectorXd VariableScaling::to_x(const Eigen::VectorXd& rho) const {
-  Eigen::VectorXd x(size());
-  for (Eigen::Index k = 0; k < size(); ++k) x(k) = variables_[static_cast<std::size_t>(k)].to_x(rho(k));
-  return x;
+Eigen::VectorXd VariableScaling::each(double (Variable::*map)(double) const, const Eigen::VectorXd& of) const {
+  Eigen::VectorXd mapped(size());
+  for (Eigen::Index k = 0; k < size(); ++k) mapped(k) = (variables_[static_cast<std::size_t>(k)].*map)(of(k));
+  return mapped;
 }
 
+Eigen::VectorXd VariableScaling::to_x(const Eigen::VectorXd& rho) const { return each(&Variable::to_x, rho); }
 Eigen::VectorXd VariableScaling::to_rho(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd rho(size());
-  for (Eigen::Index k = 0; k < size(); ++k) rho(k) = variables_[static_cast<std::size_t>(k)].to_rho(x(k));
-  return rho.cwiseMax(rho_lower_).cwiseMin(rho_upper_);
+  return each(&Variable::to_rho, x).cwiseMax(rho_lower_).cwiseMin(rho_upper_);
 }
-
-Eigen::VectorXd VariableScaling::rho_x(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd d(size());
-  for (Eigen::Index k = 0; k < size(); ++k) d(k) = variables_[static_cast<std::size_t>(k)].rho_x(x(k));
-  return d;
-}
-
-Eigen::VectorXd VariableScaling::rho_xx(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd d(size());
-  for (Eigen::Index k = 0; k < size(); ++k) d(k) = variables_[static_cast<std::size_t>(k)].rho_xx(x(k));
-  return d;
-}
+Eigen::VectorXd VariableScaling::rho_x(const Eigen::VectorXd& x) const { return each(&Variable::rho_x, x); }
+Eigen::VectorXd VariableScaling::rho_xx(const Eigen::VectorXd& x) const { return each(&Variable::rho_xx, x); }
 
 }  // namespace mbsopt::inline optim

@@ -49,6 +49,8 @@ class VariableScaling {
     double rho_x(double x) const;
     double rho_xx(double x) const;
   };
+  Eigen::VectorXd each(double (Variable::*map)(double) const, const Eigen::VectorXd& of) const;
+
   std::vector<Variable> variables_;
   Eigen::VectorXd x_lower_, x_upper_, rho_lower_, rho_upper_;
 };
