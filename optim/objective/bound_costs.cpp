@@ -19,11 +19,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// The inputs of both costs of a term: the state of its bodies, and the term's parameters, computed from those of the
-// scene.
-class TermInputs {
+// Both costs of a term, as functions of the scene's state and parameters.
+class BoundCost final : public RunningCost, public TerminalCost {
  public:
-  TermInputs(const Scene& scene, const UserCostSpec& spec, const std::string& place) {
+  BoundCost(const Scene& scene, const UserCostSpec& spec, const std::string& place)
+      : running_(spec.running), terminal_(spec.terminal) {
     const Symbols symbols = parameter_symbols(scene);
     for (const TermParameter& parameter : spec.parameters) {
       try {
@@ -42,6 +42,28 @@ class TermInputs {
     std::iota(bodies_.begin(), bodies_.end(), 0);
   }
 
+  double g(double t, VecIn y, VecIn rho) const override { return running_->g(t, state(y), parameters(rho)); }
+  void add_g_y(double t, VecIn y, VecIn rho, double scale, VecOut out) const override {
+    const VectorXd part = state(y);
+    VectorXd bar = VectorXd::Zero(part.size());
+    running_->add_g_y(t, part, parameters(rho), scale, bar);
+    add_state(bar, out);
+  }
+  void add_g_rho(double t, VecIn y, VecIn rho, double scale, VecOut out) const override {
+    VectorXd bar = VectorXd::Zero(static_cast<Index>(parameters_.size()));
+    running_->add_g_rho(t, state(y), parameters(rho), scale, bar);
+    add_rho(rho, bar, out);
+  }
+  double value(VecIn y, VecIn rho) const override { return terminal_->value(state(y), parameters(rho)); }
+  void adjoint_init(VecIn y, VecIn rho, VecOut lambda, VecOut mu) const override {
+    const VectorXd part = state(y);
+    VectorXd of_state = VectorXd::Zero(part.size()), of_p = VectorXd::Zero(static_cast<Index>(parameters_.size()));
+    terminal_->adjoint_init(part, parameters(rho), of_state, of_p);
+    lambda.setZero(), mu.setZero();
+    add_state(of_state, lambda), add_rho(rho, of_p, mu);
+  }
+
+ private:
   VectorXd state(VecIn y) const {
     const StateLayout own{static_cast<int>(bodies_.size()) - 1}, all = StateLayout::of(y);
     VectorXd part(own.size());
@@ -60,7 +82,7 @@ class TermInputs {
   }
 
   VectorXd parameters(VecIn rho) const {
-    VectorXd p(count());
+    VectorXd p(static_cast<Index>(parameters_.size()));
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       Program::Scratch scratch = parameters_[i].scratch();
       p(static_cast<Index>(i)) = parameters_[i].value(view(rho), scratch);
@@ -74,55 +96,12 @@ class TermInputs {
       parameters_[i].add_gradient(view(rho), p_bar(static_cast<Index>(i)), gradient, scratch);
     }
   }
-  Index count() const { return static_cast<Index>(parameters_.size()); }
-
- private:
   static std::span<const double> view(const VecIn& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
 
-  std::vector<Program> parameters_;
-  std::vector<int> bodies_{0};  // of the term, by their numbers in the scene; the ground first
-};
-
-class BoundRunning final : public RunningCost {
- public:
-  BoundRunning(TermInputs inputs, std::shared_ptr<const RunningCost> cost)
-      : inputs_(std::move(inputs)), cost_(std::move(cost)) {}
-  double g(double t, VecIn y, VecIn rho) const override {
-    return cost_->g(t, inputs_.state(y), inputs_.parameters(rho));
-  }
-  void add_g_y(double t, VecIn y, VecIn rho, double scale, VecOut out) const override {
-    const VectorXd part = inputs_.state(y);
-    VectorXd bar = VectorXd::Zero(part.size());
-    cost_->add_g_y(t, part, inputs_.parameters(rho), scale, bar);
-    inputs_.add_state(bar, out);
-  }
-  void add_g_rho(double t, VecIn y, VecIn rho, double scale, VecOut out) const override {
-    VectorXd bar = VectorXd::Zero(inputs_.count());
-    cost_->add_g_rho(t, inputs_.state(y), inputs_.parameters(rho), scale, bar);
-    inputs_.add_rho(rho, bar, out);
-  }
-
- private:
-  TermInputs inputs_;
-  std::shared_ptr<const RunningCost> cost_;
-};
-
-class BoundTerminal final : public TerminalCost {
- public:
-  BoundTerminal(TermInputs inputs, std::shared_ptr<const TerminalCost> cost)
-      : inputs_(std::move(inputs)), cost_(std::move(cost)) {}
-  double value(VecIn y, VecIn rho) const override { return cost_->value(inputs_.state(y), inputs_.parameters(rho)); }
-  void adjoint_init(VecIn y, VecIn rho, VecOut lambda, VecOut mu) const override {
-    const VectorXd part = inputs_.state(y);
-    VectorXd of_state = VectorXd::Zero(part.size()), of_p = VectorXd::Zero(inputs_.count());
-    cost_->adjoint_init(part, inputs_.parameters(rho), of_state, of_p);
-    lambda.setZero(), mu.setZero();
-    inputs_.add_state(of_state, lambda), inputs_.add_rho(rho, of_p, mu);
-  }
-
- private:
-  TermInputs inputs_;
-  std::shared_ptr<const TerminalCost> cost_;
+  std::shared_ptr<const RunningCost> running_;
+  std::shared_ptr<const TerminalCost> terminal_;
+  std::vector<Program> parameters_;  // of the term, computed from those of the scene
+  std::vector<int> bodies_{0};       // of the term, by their numbers in the scene; the ground first
 };
 
 }  // namespace
@@ -131,9 +110,11 @@ BoundCosts bound_costs(const Scene& scene, const UserCostSpec& spec, const std::
   if (!spec.running && !spec.terminal)
     throw std::invalid_argument(place + ".cost: '" + spec.cost +
                                 "' is a cost written in C++, which nothing has provided");
-  const TermInputs inputs(scene, spec, place);
-  return {spec.running ? std::make_shared<BoundRunning>(inputs, spec.running) : nullptr,
-          spec.terminal ? std::make_shared<BoundTerminal>(inputs, spec.terminal) : nullptr};
+  const auto bound = std::make_shared<const BoundCost>(scene, spec, place);
+  BoundCosts costs;
+  if (spec.running) costs.running = bound;
+  if (spec.terminal) costs.terminal = bound;
+  return costs;
 }
 
 }  // namespace mbsopt::inline optim
