@@ -43,6 +43,10 @@ class DataCheck {
   }
 
  private:
+  void report(const std::string& path, std::string words, bool is_warning = false) {
+    issues_.push_back({path, std::move(words), is_warning});
+  }
+  void warn(const std::string& path, std::string words) { report(path, std::move(words), true); }
   std::string channel_path(std::size_t c, const char* key) const {
     return child_path(place_ + ".channels", c) + "." + key;
   }
@@ -51,13 +55,12 @@ class DataCheck {
     const std::string& column = experiment_.channels[c].column;
     attempt(channel_path(c, "column"), [&] { data_.column(column); });
     if (column == experiment_.time)
-      issues_.push_back({channel_path(c, "column"), fmt::format("'{}' is the column of the times", column)});
+      report(channel_path(c, "column"), fmt::format("'{}' is the column of the times", column));
     check_unit(c);
     for (std::size_t k = 0; k < c; ++k)
       if (experiment_.channels[k].column == column)
-        issues_.push_back(
-            {channel_path(c, "column"),
-             fmt::format("'{}' is compared by channels[{}] already; its samples would count twice", column, k)});
+        report(channel_path(c, "column"),
+               fmt::format("'{}' is compared by channels[{}] already; its samples would count twice", column, k));
   }
 
   void check_unit(std::size_t c) {
@@ -68,9 +71,9 @@ class DataCheck {
     const std::string text = stated_unit(channel, data_);
     const std::optional<Unit> unit = parse_column_unit(text);
     if (text.empty() || !unit || unit->dimension.is_none() || compatible(unit->dimension, row->dimension)) return;
-    issues_.push_back({channel_path(c, "column"),
-                       fmt::format("'{}' is in {}, the sensor '{}' in {}", channel.column, to_string(unit->dimension),
-                                   channel.sensor, to_string(row->dimension))});
+    report(channel_path(c, "column"),
+           fmt::format("'{}' is in {}, the sensor '{}' in {}", channel.column, to_string(unit->dimension),
+                       channel.sensor, to_string(row->dimension)));
   }
 
   // The header says one unit, the problem another one of the same dimension.
@@ -80,10 +83,8 @@ class DataCheck {
     const std::string_view header = parts_of_header(data_.header[data_.find_column(channel.column)]).unit.value_or("");
     const std::optional<Unit> said = parse_column_unit(header), counts = parse_column_unit(channel.unit);
     if (!said || !counts || !compatible(said->dimension, counts->dimension) || said->to_si == counts->to_si) return;
-    issues_.push_back({channel_path(c, "unit"),
-                       fmt::format("the header of '{}' says {}, \"unit\" says {}, which counts", channel.column, header,
-                                   channel.unit),
-                       true});
+    warn(channel_path(c, "unit"), fmt::format("the header of '{}' says {}, \"unit\" says {}, which counts",
+                                              channel.column, header, channel.unit));
   }
 
   // Numbers are in SI, as the values of the column are once they are read. Beside a column in another unit, a number
@@ -100,13 +101,11 @@ class DataCheck {
       const bool has_unit = field.text().find('[') != std::string::npos;
       if (!field.is_number() || has_unit || field.number() == when_absent) return;
       const double x = field.number();
-      issues_.push_back(
-          {channel_path(c, key),
+      warn(channel_path(c, key),
            fmt::format("is {0:g} {1}, which is {2:.3g} {3}: write \"{4}\" if {0:g} {3} is meant, else "
                        "\"{0:g} [{1}]\"",
                        x, si, x / unit->to_si, text,
-                       same ? fmt::format("{:g} [{}]", x, text) : fmt::format("{:g} [{}]", x * unit->to_si, si)),
-           true});
+                       same ? fmt::format("{:g} [{}]", x, text) : fmt::format("{:g} [{}]", x * unit->to_si, si)));
     };
     check("sigma", channel.sigma, ChannelSpec().sigma.number());
     check("bias", channel.bias, 0);
@@ -117,7 +116,7 @@ class DataCheck {
     try {
       look();
     } catch (const CsvError& error) {
-      issues_.push_back({path, error.what()});
+      report(path, error.what());
     }
   }
 
@@ -137,9 +136,8 @@ class DataCheck {
     for (std::size_t c = 0; c < experiment_.channels.size(); ++c) {
       const std::vector<std::size_t> rows = samples(experiment_.channels[c]);
       if (rows.empty()) {
-        issues_.push_back(
-            {channel_path(c, "column"), fmt::format("'{}' of {} has no sample {}: its cells are empty or NaN there",
-                                                    experiment_.channels[c].column, data_.name, window())});
+        report(channel_path(c, "column"), fmt::format("'{}' of {} has no sample {}: its cells are empty or NaN there",
+                                                      experiment_.channels[c].column, data_.name, window()));
         continue;
       }
       first = std::min(first, rows.front()), last = std::max(last, rows.back());
@@ -156,25 +154,22 @@ class DataCheck {
   void check_times(double first, double last, const std::string& place) {
     const double span = last - first;
     if (!experiment_.start_time && span > 0 && first - start_ > kFar * span)
-      issues_.push_back(
-          {place_ + ".data",
-           fmt::format(
-               "{}: the record begins {:.6g} s after the start of the simulation, at {} s, and "
-               "lasts {:.6g} s: all the time before would be simulated. Subtract the first time from the column '{}' "
-               "(\"time_zero\": \"first\" does), or say by \"start_time\" where the experiment begins",
-               place, first - start_, start_, span, experiment_.time)});
+      report(place_ + ".data",
+             fmt::format(
+                 "{}: the record begins {:.6g} s after the start of the simulation, at {} s, and "
+                 "lasts {:.6g} s: all the time before would be simulated. Subtract the first time from the column '{}' "
+                 "(\"time_zero\": \"first\" does), or say by \"start_time\" where the experiment begins",
+                 place, first - start_, start_, span, experiment_.time));
     else if (last - start_ < kResolved * std::max(std::abs(start_), std::abs(last)))
-      issues_.push_back(
-          {place_ + ".data",
-           fmt::format("{}: times about {:.6g} s do not resolve the steps of a record "
-                       "of {:.6g} s: subtract the first time from the column '{}' (\"time_zero\": \"first\" does)",
-                       place, last, last - start_, experiment_.time)});
+      report(place_ + ".data",
+             fmt::format("{}: times about {:.6g} s do not resolve the steps of a record "
+                         "of {:.6g} s: subtract the first time from the column '{}' (\"time_zero\": \"first\" does)",
+                         place, last, last - start_, experiment_.time));
     else if (span > kLong && experiment_.time_unit.empty() && !time_has_unit())
-      issues_.push_back({place_ + ".time",
-                         fmt::format("{}: the record lasts {:.6g} s, {:.3g} days: is '{}' in s? Give its unit in the "
-                                     "header or in \"time_unit\" (\"s\", \"ms\")",
-                                     place, span, span / 86400, experiment_.time),
-                         true});
+      warn(place_ + ".time",
+           fmt::format("{}: the record lasts {:.6g} s, {:.3g} days: is '{}' in s? Give its unit in the "
+                       "header or in \"time_unit\" (\"s\", \"ms\")",
+                       place, span, span / 86400, experiment_.time));
   }
 
   bool time_has_unit() const {
@@ -191,10 +186,9 @@ class DataCheck {
     const std::vector<double>& measured = data_.column(experiment_.channels[c].column);
     const auto [least, most] = std::ranges::minmax_element(rows, {}, [&](std::size_t row) { return measured[row]; });
     if (rows.size() > 2 && measured[*least] == measured[*most])
-      issues_.push_back({channel_path(c, "column"),
-                         fmt::format("'{}' of {} never changes: {} samples of {:g}", experiment_.channels[c].column,
-                                     data_.name, rows.size(), measured[*least]),
-                         true});
+      warn(channel_path(c, "column"),
+           fmt::format("'{}' of {} never changes: {} samples of {:g}", experiment_.channels[c].column, data_.name,
+                       rows.size(), measured[*least]));
     if (!check_turns(c, rows)) check_size(c, std::abs(measured[*least]) > std::abs(measured[*most]) ? *least : *most);
   }
 
@@ -212,11 +206,10 @@ class DataCheck {
     if (!angle_sensor(channel) || channel.gain.number() != 1 || !stated_unit(channel, data_).empty()) return;
     const double angle = data_.column(channel.column)[row];
     if (!(std::abs(angle) > kMany)) return;
-    issues_.push_back({channel_path(c, "column"),
-                       fmt::format("{}: '{}' is {:.6g} rad, {:.3g} turns: is the column in degrees? Give its unit in "
-                                   "the header or in \"unit\" (\"deg\" or \"rad\")",
-                                   data_.place(row), channel.column, angle, std::abs(angle) / (2 * std::numbers::pi)),
-                       true});
+    warn(channel_path(c, "column"),
+         fmt::format("{}: '{}' is {:.6g} rad, {:.3g} turns: is the column in degrees? Give its unit in "
+                     "the header or in \"unit\" (\"deg\" or \"rad\")",
+                     data_.place(row), channel.column, angle, std::abs(angle) / (2 * std::numbers::pi)));
   }
 
   // An unwrapped angle is right if its samples are dense: steps of less than half a turn.
@@ -228,12 +221,10 @@ class DataCheck {
     for (std::size_t i = 1; i < rows.size(); ++i) {
       const double step = std::abs(measured[rows[i]] - measured[rows[i - 1]]) / turn;
       if (!(step > kDoubtful)) continue;
-      issues_.push_back(
-          {channel_path(c, "unwrap"),
+      warn(channel_path(c, "unwrap"),
            fmt::format("{}: '{}' still steps by {:.2g} of a turn: steps of half a turn and more cannot be "
                        "told from its jumps, so the unwrapped angle may be wrong from here on",
-                       data_.place(rows[i]), channel.column, step),
-           true});
+                       data_.place(rows[i]), channel.column, step));
       return true;
     }
     return false;
@@ -250,13 +241,11 @@ class DataCheck {
     std::size_t wrap = first_wrap(measured, 2 * std::numbers::pi * std::abs(channel.gain.number()));
     const bool degrees = wrap == 0 && channel.gain.number() == 1 && (wrap = first_wrap(measured, 360)) > 0;
     if (wrap == 0) return false;
-    issues_.push_back(
-        {channel_path(c, "column"),
+    warn(channel_path(c, "column"),
          fmt::format("{}: '{}' jumps from {:.6g} to {:.6g}, by about a turn{}; the sensor '{}' goes on counting. "
                      "Unwrap the column (\"unwrap\": true does)",
                      data_.place(rows[wrap]), channel.column, measured[wrap - 1], measured[wrap],
-                     degrees ? " in degrees, where rad are expected" : "", sensor->name),
-         true});
+                     degrees ? " in degrees, where rad are expected" : "", sensor->name));
     return true;
   }
 
