@@ -32,9 +32,9 @@ const DesignSpec& checked(const Problem& problem) {
       throw std::invalid_argument(
           fmt::format("design.subject_to[{}]: lower is {}, above upper {}", i, *bound.lower, *bound.upper));
   }
-  if (const std::vector<DesignIssue> issues = optimizer_issues(spec, problem.scene); !issues.empty())
+  if (const std::vector<SceneIssue> issues = optimizer_issues(spec, problem.scene); !issues.empty())
     throw std::invalid_argument(issues[0].path + ": " + issues[0].message);
-  if (const std::optional<DesignIssue> issue = curvature_issue(problem))
+  if (const std::optional<SceneIssue> issue = curvature_issue(problem))
     throw std::invalid_argument(issue->path + ": " + issue->message);
   return spec;
 }

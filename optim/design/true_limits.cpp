@@ -17,11 +17,6 @@ constexpr double kLeastSlope = 0.2, kLargestSlope = 20;
 // A change of psi below it is lost in what solutions scatter by.
 constexpr double kNoChange = 1e-4;
 
-template <class Limit>
-bool is_equality(const Limit& l) {
-  return l.lower && l.upper && *l.lower == *l.upper;
-}
-
 }  // namespace
 
 TrueLimits::TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator) {

@@ -67,16 +67,14 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
     if (result->is_zero()) result.reset();
     return result;
   };
-  const std::optional<Expression>* expression = &spec.running;
-  std::string_view part = "running";
-  for (std::size_t k = 0; k < spec.means.size(); ++k)
-    if (spec.means[k]) mean_ = &kMeanKinds[k], expression = &spec.means[k], part = mean_->name;
+  mean_ = given_kind(spec.means);
+  const std::string_view part = mean_ ? mean_->name : "running";
   if (mean_ && (spec.running || spec.terminal || spec.parameters_only || !spec.samples.empty() || !spec.track.empty()))
     throw std::invalid_argument(
         fmt::format("{}.{}: must be the only part of its objective, but other parts are given", place, part));
   sharpness_ = spec.sharpness.value_or(ObjectiveSpec::kSharpness);
   duration_ = scene.simulation.end_time - scene.simulation.start_time;
-  running_ = compile(*expression, std::string(part));
+  running_ = compile(mean_ ? mean_of(spec.means, part) : spec.running, std::string(part));
   terminal_ = compile(spec.terminal, "terminal");
   const double t0 = scene.simulation.start_time, t1 = scene.simulation.end_time;
   for (std::size_t i = 0; i < spec.samples.size(); ++i) {

@@ -61,6 +61,18 @@ void check_track(Checker& checker, const TrackTerm& term, const std::string& pla
                                                    " rows lie within " + of_run + "; the others are left out");
 }
 
+long count_of(const Means& means) {
+  return std::ranges::count_if(means, [](const std::optional<Expression>& mean) { return mean.has_value(); });
+}
+
+// The names of all means, and others.
+std::vector<std::string> kinds_and(std::initializer_list<std::string> others) {
+  std::vector<std::string> kinds;
+  for (const MeanKind& kind : kMeanKinds) kinds.emplace_back(kind.name);
+  kinds.insert(kinds.end(), others);
+  return kinds;
+}
+
 }  // namespace
 
 void check_meaning(Checker& checker, const TrackTerm& term) { check_column_unit(checker, term.unit, term.sensor); }
@@ -88,18 +100,8 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   checker.must_be_identifier(checker.path(), objective.name);
   const bool sums = objective.running || objective.terminal || objective.parameters_only ||
                     !objective.samples.empty() || !objective.track.empty();
-  int alone = 0;
-  bool extreme = false;
-  std::vector<std::string> kinds;
-  for (std::size_t k = 0; k < objective.means.size(); ++k) {
-    kinds.emplace_back(kMeanKinds[k].name);
-    if (!objective.means[k]) continue;
-    ++alone;
-    extreme = extreme || kMeanKinds[k].extreme != Extreme::none;
-  }
-  kinds.emplace_back("eigenvalue"), kinds.emplace_back("user");
-  if (objective.eigenvalue) ++alone;
-  if (objective.is_written_in_cpp()) ++alone;
+  const long alone = count_of(objective.means) + objective.eigenvalue.has_value() + objective.is_written_in_cpp();
+  const std::vector<std::string> kinds = kinds_and({"eigenvalue", "user"});
   if (!sums && alone == 0)
     checker.issue(checker.path(),
                   "has no part; running, terminal, samples, track and parameters_only (added), or one of " +
@@ -108,7 +110,7 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
     checker.issue(checker.path(),
                   "has one of " + joined(kinds) +
                       " and another part; each of them must be the only part, so make it an objective of its own");
-  if (objective.sharpness && !extreme)
+  if (objective.sharpness && !objective.is_extreme())
     checker.issue(checker.path("sharpness"),
                   "is given without maximum_of, minimum_of or peak_to_peak_of, which it belongs to");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
@@ -131,16 +133,7 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
 }
 
 void check_meaning(Checker& checker, const ObjectiveBound& bound) {
-  std::vector<std::string> kinds;
-  long given = bound.objective.empty() ? 0 : 1;
-  bool extreme = false;
-  for (std::size_t k = 0; k < bound.means.size(); ++k) {
-    kinds.emplace_back(kMeanKinds[k].name);
-    given += bound.means[k].has_value();
-    extreme = extreme || (bound.means[k] && kMeanKinds[k].extreme != Extreme::none);
-  }
-  kinds.emplace_back("sampled");
-  given += bound.sampled.has_value();
+  const long given = !bound.objective.empty() + count_of(bound.means) + bound.sampled.has_value();
   if (bound.sampled.has_value() != bound.every.has_value())
     checker.issue(checker.path(), "has only one of \"sampled\" and \"every\"; they say what is limited, and when");
   constexpr double kMostLimits = 10'000;
@@ -150,8 +143,8 @@ void check_meaning(Checker& checker, const ObjectiveBound& bound) {
                                              text_of(kMostLimits) + " limits of the simulated time");
   if (given != 1)
     checker.issue(checker.path(), std::string(given == 0 ? "does not say what it bounds" : "bounds several things") +
-                                      "; one is needed: objective, or in its place " + joined(kinds));
-  if (bound.sharpness && !extreme)
+                                      "; one is needed: objective, or in its place " + joined(kinds_and({"sampled"})));
+  if (bound.sharpness && !is_extreme(bound.means))
     checker.issue(checker.path("sharpness"),
                   "is given without maximum_of, minimum_of or peak_to_peak_of; a named objective has its own");
   if (!bound.lower && !bound.upper)
@@ -162,14 +155,14 @@ void check_meaning(Checker& checker, const ObjectiveBound& bound) {
 }
 
 void check_meaning(Checker& checker, const DesignSpec& design) {
-  for (const DesignIssue& found : optimizer_issues(design, checker.facts().scene()))
+  for (const SceneIssue& found : optimizer_issues(design, checker.facts().scene()))
     checker.issue(found.path, found.message);
   std::map<std::string, std::size_t> first;
   for (std::size_t i = 0; i < design.subject_to.size(); ++i) {
     const ObjectiveBound& bound = design.subject_to[i];
-    const std::optional<std::size_t> kind = bounded_mean(bound);
-    if (!kind && !bound.sampled) continue;
-    const std::string name = kind ? name_of_mean(*kind, *bound.means[*kind]) : "sampled " + bound.sampled->text();
+    const bool mean = given_kind(bound.means);
+    if (!mean && !bound.sampled) continue;
+    const std::string name = mean ? name_of_mean(bound.means) : "sampled " + bound.sampled->text();
     const auto [it, is_new] = first.emplace(name, i);
     if (!is_new)
       checker.issue(child_path(checker.path("subject_to"), i), "bounds " + it->first + " once more; " +
@@ -277,10 +270,8 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   const std::vector<ExperimentSpec>& experiments = identification.experiments;
   const std::string list = checker.path("experiments");
   if (identification.multistart) {
-    for (const DesignIssue& found : missing_bounds(identification.variables, checker.facts().scene(),
-                                                   "identification.multistart draws starts between them"))
-      checker.issue(found.path, found.message);
-    for (const DesignIssue& found : starts_issues(*identification.multistart, checker.path("multistart")))
+    for (const SceneIssue& found : starts_issues(*identification.multistart, identification.variables,
+                                                 checker.facts().scene(), checker.path("multistart")))
       checker.issue(found.path, found.message);
     if (identification.multistart->all_branches)
       checker.issue(checker.path("multistart") + ".branches",
@@ -336,8 +327,8 @@ std::string override_of_delay(const CaseSpec& load_case, const std::string& sign
 }
 
 // A signal that covers the run may not cover that of a case. A case may have its own samples and delays.
-void check_coverage(Checker& checker, const CaseSpec& load_case, const Problem& problem, const std::string& place) {
-  const Problem of_case = problem_of(problem, load_case);
+void check_coverage(Checker& checker, const CaseSpec& load_case, const Problem& of_case, const Problem& problem,
+                    const std::string& place) {
   const SceneFacts facts(of_case.scene);
   const SimulationSettings& run = of_case.scene.simulation;
   for (const Signal& signal : of_case.scene.signals) {
@@ -372,8 +363,8 @@ std::vector<MovedJumps> moved_jumps(const Scene& scene, const std::vector<std::s
   return found;
 }
 
-void check_moved_jumps(Checker& checker, const Problem& problem, const CaseSpec& load_case, const std::string& place) {
-  const Problem of_case = problem_of(problem, load_case);
+void check_moved_jumps(Checker& checker, const CaseSpec& load_case, const Problem& of_case, const Problem& problem,
+                       const std::string& place) {
   for (MovedJumps& jumps : moved_jumps(of_case.scene, of_case.design->variables)) {
     const std::string moved = override_of_delay(load_case, jumps.signal, problem.scene);
     jumps.by = in_names_of_problem(jumps.by, load_case, problem.scene);
@@ -387,8 +378,9 @@ void check_moved_jumps(Checker& checker, const Problem& problem, const CaseSpec&
 // Checks signals with the changes by cases and experiments, and with the varied parameters.
 void check_signals(Checker& checker, const Problem& problem) {
   for (std::size_t c = 0; c < problem.cases.size(); ++c) {
-    check_coverage(checker, problem.cases[c], problem, child_path("cases", c));
-    if (problem.design) check_moved_jumps(checker, problem, problem.cases[c], child_path("cases", c));
+    const Problem of_case = problem_of(problem, problem.cases[c]);
+    check_coverage(checker, problem.cases[c], of_case, problem, child_path("cases", c));
+    if (problem.design) check_moved_jumps(checker, problem.cases[c], of_case, problem, child_path("cases", c));
   }
   const auto check = [&](const std::vector<std::string>& names, const std::string& where) {
     for (const MovedJumps& jumps : moved_jumps(problem.scene, names)) checker.issue(jumps.place(), jumps.words(where));
@@ -430,7 +422,7 @@ std::vector<SceneIssue> find_issues(const Problem& problem) {
   checker.check(problem);
   check_meaning(checker, problem.scene);
   if (issues.empty()) {
-    if (const std::optional<DesignIssue> found = curvature_issue(problem)) checker.issue(found->path, found->message);
+    if (const std::optional<SceneIssue> found = curvature_issue(problem)) checker.issue(found->path, found->message);
     check_signals(checker, problem);
   }
   return without_repetitions(std::move(issues));

@@ -7,12 +7,6 @@
 
 namespace mbsopt::inline optim {
 
-std::optional<std::size_t> bounded_mean(const ObjectiveBound& bound) {
-  for (std::size_t k = 0; k < bound.means.size(); ++k)
-    if (bound.means[k]) return k;
-  return std::nullopt;
-}
-
 std::vector<double> instants(const ObjectiveBound& bound, const SimulationSettings& simulation) {
   constexpr double kRounding = 1e-9;  // of the number of intervals
   const double intervals = (simulation.end_time - simulation.start_time) / *bound.every;
@@ -22,8 +16,9 @@ std::vector<double> instants(const ObjectiveBound& bound, const SimulationSettin
   return times;
 }
 
-std::string name_of_mean(std::size_t kind, const Expression& of) {
-  return fmt::format("{} {}", kMeanKinds[kind].name, of.text());
+std::string name_of_mean(const Means& means) {
+  const std::string_view kind = given_kind(means)->name;
+  return fmt::format("{} {}", kind, mean_of(means, kind)->text());
 }
 
 namespace {
@@ -54,13 +49,12 @@ void name_bounded_means(Problem& problem) {
   if (!problem.design) return;
   name_sampled(problem);
   for (ObjectiveBound& bound : problem.design->subject_to) {
-    const std::optional<std::size_t> kind = bounded_mean(bound);
-    if (!kind) continue;
+    if (!given_kind(bound.means)) continue;
     ObjectiveSpec objective;
-    objective.name = bound.objective = name_of_mean(*kind, *bound.means[*kind]);
-    objective.means[*kind] = bound.means[*kind];
+    objective.name = bound.objective = name_of_mean(bound.means);
+    objective.means = bound.means;
     const double size = std::max(std::abs(bound.lower.value_or(0)), std::abs(bound.upper.value_or(0)));
-    if (kMeanKinds[*kind].extreme != Extreme::none)
+    if (objective.is_extreme())
       objective.sharpness = bound.sharpness.value_or(ObjectiveBound::kSharpness / (size > 0 ? size : 1));
     bound.means = {}, bound.sharpness.reset();
     problem.objectives.push_back(std::move(objective));

@@ -6,8 +6,6 @@
 // So all functions for objectives serve them, too.
 #pragma once
 
-#include <cstddef>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,13 +13,11 @@
 
 namespace mbsopt::inline optim {
 
-// The entry of kMeanKinds that a bound gives in place of an objective; the first one if it gives several.
-std::optional<std::size_t> bounded_mean(const ObjectiveBound& bound);
-
 // Instants of a sampled limit: start_time + k every, up to end_time.
 std::vector<double> instants(const ObjectiveBound& bound, const SimulationSettings& simulation);
 
-std::string name_of_mean(std::size_t kind, const Expression& of);  // "maximum_of F"
+// "maximum_of F", the objective of a mean that a bound gives.
+std::string name_of_mean(const Means& means);
 
 // Adds the objectives, and makes the bounds refer to them. The default sharpness of an extreme is
 // ObjectiveBound::kSharpness/max(|lower|, |upper|), over 1 if that is 0: the expression has the size of its limit.

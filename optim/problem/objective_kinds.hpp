@@ -9,8 +9,12 @@
 // An extreme is the same for every x0 in M(x - x0), x0 + N: x0 keeps exp within the range of numbers.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <optional>
 #include <string_view>
+
+#include "core/expression/expression.hpp"
 
 namespace mbsopt::inline optim {
 
@@ -50,5 +54,25 @@ inline constexpr MeanKind kMeanKinds[] = {
      logarithm, Extreme::both},
     {"rms_of", "alone: root of its mean square over time", square, root},
 };
+
+// An expression per kind. An objective, or a limit, gives at most one of them.
+using Means = std::array<std::optional<Expression>, std::size(kMeanKinds)>;
+
+// The kind that is given, or null; the first one if there are several.
+inline const MeanKind* given_kind(const Means& means) {
+  for (std::size_t k = 0; k < means.size(); ++k)
+    if (means[k]) return &kMeanKinds[k];
+  return nullptr;
+}
+inline bool is_extreme(const Means& means) {
+  const MeanKind* const kind = given_kind(means);
+  return kind && kind->extreme != Extreme::none;
+}
+// The expression of a kind, such as "rms_of".
+auto& mean_of(auto& means, std::string_view kind) {
+  std::size_t k = 0;
+  while (kMeanKinds[k].name != kind) ++k;
+  return means[k];
+}
 
 }  // namespace mbsopt::inline optim

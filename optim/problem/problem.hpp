@@ -54,7 +54,7 @@ struct ObjectiveSpec {
   std::optional<Expression> running, terminal, parameters_only;
   std::vector<ObjectiveSample> samples;
   std::vector<TrackTerm> track;
-  std::array<std::optional<Expression>, std::size(kMeanKinds)> means;
+  Means means;
   std::optional<EigenvalueSpec> eigenvalue;  // alone
   std::optional<double> sharpness;           // of an extreme [1/unit of the expression]
   static constexpr double kSharpness = 100;
@@ -64,28 +64,23 @@ struct ObjectiveSpec {
   std::optional<UserCostSpec> user = {};  // the same by its name, in a file
   bool is_written_in_cpp() const { return running_in_cpp || terminal_in_cpp || user; }
 
-  bool is_extreme() const {  // has a sharpness
-    for (std::size_t k = 0; k < means.size(); ++k)
-      if (means[k] && kMeanKinds[k].extreme != Extreme::none) return true;
-    return false;
-  }
-
-  // kind: "rms_of"
-  std::optional<Expression>& mean(std::string_view kind) {
-    return means[static_cast<std::size_t>(std::ranges::find(kMeanKinds, kind, &MeanKind::name) - kMeanKinds)];
-  }
+  bool is_extreme() const { return mbsopt::is_extreme(means); }  // has a sharpness
+  std::optional<Expression>& mean(std::string_view kind) { return mean_of(means, kind); }
 };
 
 // A limit on a named objective, or on a mean of an expression without a name (bounded_means.hpp).
 struct ObjectiveBound {
   std::string objective;
   std::optional<double> lower = {}, upper = {};
-  std::array<std::optional<Expression>, std::size(kMeanKinds)> means = {};
+  Means means = {};
   std::optional<double> sharpness = {};  // when absent kSharpness over the size of the bounds
   static constexpr double kSharpness = 100;
   std::optional<Expression> sampled = {};  // a limit at start_time + k every
   std::optional<double> every = {};        // [s]
 };
+
+// Whether a lower and an upper bound are one value.
+bool is_equality(const auto& bound) { return bound.lower && bound.upper && *bound.lower == *bound.upper; }
 
 struct OptimizerSpec {
   static constexpr const char* kLeastSquares = "least_squares";

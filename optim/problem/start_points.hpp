@@ -22,7 +22,7 @@ namespace mbsopt::inline optim {
 // Returns count points of the unit cube, one per column.
 Eigen::MatrixXd unit_points(StartSampling sampling, Eigen::Index dimension, Eigen::Index count, long seed);
 
-// Values of the parameters at each start; they must have bounds (missing_bounds).
+// Values of the parameters at each start; they must have bounds (starts_issues).
 std::vector<Eigen::VectorXd> start_values(const std::vector<Parameter>& parameters, const MultistartSpec& spec,
                                           long seed);
 

@@ -332,7 +332,7 @@ TEST_CASE("assembly modes are refused where they mean nothing, and their search 
   problem.design->multistart->all_branches = true;
   CHECK(optimizer_issues(*problem.design, problem.scene).empty());
   problem.scene.joints.emplace_back().type = "rack_pinion";
-  const std::vector<DesignIssue> issues = optimizer_issues(*problem.design, problem.scene);
+  const std::vector<SceneIssue> issues = optimizer_issues(*problem.design, problem.scene);
   REQUIRE(issues.size() == 1);
   CHECK(issues[0].path == "joints[4]");
   CHECK_THAT(issues[0].message, Contains("design.multistart.branches"));

@@ -189,7 +189,7 @@ TEST_CASE("five-bar: interrupted within a simulation, a design counts and lists 
 TEST_CASE("what an optimiser cannot do is said where it is asked for", "[design_optimizers]") {
   Problem problem = still();
   const auto issue = [&] {
-    const std::vector<DesignIssue> issues = optimizer_issues(*problem.design, problem.scene);
+    const std::vector<SceneIssue> issues = optimizer_issues(*problem.design, problem.scene);
     return issues.empty() ? std::string() : issues[0].path + ": " + issues[0].message;
   };
   CHECK(issue().empty());
