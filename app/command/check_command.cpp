@@ -31,8 +31,8 @@ struct ComparedMethod {
 };
 
 std::vector<ComparedMethod> compared_methods(const GradientCheck& check) {
-  std::vector<ComparedMethod> methods{{"adjoint", "adjoint", check.adjoint_cost, check.adjoint},
-                                      {"tlm", "tlm", check.tlm_cost, check.tlm}};
+  std::vector<ComparedMethod> methods{{"adjoint", "adjoint", check.timing.adjoint, check.adjoint},
+                                      {"tlm", "tlm", check.timing.tlm, check.tlm}};
   if (check.discrete) methods.push_back({"fd_frozen", "differences, frozen steps", check.frozen_cost, check.frozen});
   methods.push_back({"fd_free", "differences, free steps", check.free_cost, check.free});
   return methods;
@@ -129,13 +129,13 @@ void print_costs(std::ostream& out, const GradientCheck& check) {
     table.add(
         {name, fmt::format("{:.2g}", cost.wall_seconds), fmt::format("{:.{}f}", cost.ratio, cost.ratio < 10 ? 1 : 0)});
   };
-  add("one simulation", check.simulation);
+  add("one simulation", check.timing.simulation);
   for (const ComparedMethod& method : compared_methods(check)) add(method.name, method.cost);
   out << '\n' << table.text();
   out << fmt::format(
       "one simulation: a run with the same objectives and tolerances, without derivatives; medians of {} in turn with "
       "adjoint and tlm\n",
-      counted(check.timing_rounds, "round"));
+      counted(check.timing.rounds, "round"));
 }
 
 Json gradient_json(const GradientCheck& check, const Eigen::MatrixXd& psi_rho) {

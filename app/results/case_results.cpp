@@ -9,7 +9,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "optim/check/gradient_check.hpp"
-#include "optim/objective/case_evaluator.hpp"
+#include "optim/objective/evaluator.hpp"
 #include "optim/problem/load_cases.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
@@ -27,10 +27,10 @@ void add_cases(Run& run, bool gradients, GradientMethod method) {
   const std::vector<std::string> parameters = names_of(problem.scene.parameters);
   std::vector<std::string> header{"case"};
   EvaluatorOptions options;
-  options.method = method, options.progress = run.watched("load cases");
-  CaseEvaluator evaluator(problem, objectives, parameters, options, case_threads(run));
+  options.method = method, options.progress = run.watched("load cases"), options.threads = case_threads(run);
+  Evaluator evaluator(problem, objectives, parameters, options);
   const Eigen::VectorXd rho = evaluator.start();
-  const CaseEvaluation& all = gradients ? evaluator.gradients(rho) : evaluator.values(rho);
+  const Evaluation all = gradients ? evaluator.gradients(rho) : evaluator.values(rho);
   run.progress.finish();
   if (!all.ok) return run.broke_off("the load cases are incomplete", all.message);
   const std::vector<std::optional<double>> true_values = evaluator.true_values(rho);

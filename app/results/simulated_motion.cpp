@@ -76,15 +76,13 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
 
   motion.running.columns = {"t"};
   std::vector<std::shared_ptr<const PointCost>> terms;  // g of a sum or x of a mean or extreme; null if there is none
-  std::vector<const Objective*> all;
   for (const Objective& objective : objectives) {
     motion.running.columns.push_back(objective.name());
     terms.push_back(objective.expression(mechanism));
-    all.push_back(&objective);
   }
   RunOptions options;
   options.progress = run.watched("simulating");
-  const ObjectiveRun::Sweep recorded = [&](std::span<const Cost> costs) {
+  const auto recorded = [&](std::span<const Cost> costs) {
     motion.trajectory = {};
     Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
     JointForces forces(scene, rho, sampling.times.size());
@@ -100,14 +98,14 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
     return result;
   };
   try {
-    motion.simulation = ObjectiveRun(all, mechanism, settings, options.progress).run(recorded);
+    motion.simulation = run_objectives(objectives, mechanism, settings, recorded, options.progress);
     motion.instants = instants_of(objectives, mechanism, options.progress);
   } catch (const NoMotion&) {  // the simulation ends there, too
     motion.simulation = recorded({});
     if (motion.simulation.ok()) throw;
   }
   if (motion.simulation.ok()) {
-    motion.true_values = true_extremes(all, mechanism, settings, motion.simulation.steps, options.progress);
+    motion.true_values = true_extremes(objectives, mechanism, settings, motion.simulation.steps, options.progress);
     if (interrupted()) motion.simulation.status = SimulationStatus::stopped;
   }
   run.progress.finish();

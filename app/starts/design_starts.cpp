@@ -12,8 +12,8 @@
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
-#include "optim/objective/case_evaluator.hpp"
 #include "optim/objective/case_objective.hpp"
+#include "optim/objective/evaluator.hpp"
 #include "optim/problem/load_cases.hpp"
 #include "optim/problem/start_points.hpp"
 #include "optim/solver/nlopt_methods.hpp"
@@ -138,8 +138,8 @@ DesignResult told_again(const Problem& problem, const NlpScale& scale, std::opti
 void describe_given_cases(const Problem& problem, DesignResult& design) {
   std::vector<std::string> objectives{design.objective};
   for (const ObjectiveBound& bound : problem.design->subject_to) objectives.push_back(bound.objective);
-  CaseEvaluator evaluator(problem, objectives, problem.design->variables);
-  const CaseEvaluation& given = evaluator.values(evaluator.start());
+  Evaluator evaluator(problem, objectives, problem.design->variables);
+  const Evaluation given = evaluator.values(evaluator.start());
   if (!given.ok) return;
   Eigen::VectorXd minimised(static_cast<Eigen::Index>(problem.cases.size()));
   auto constraint = design.constraints.begin();

@@ -7,9 +7,7 @@
 
 #include "core/cvodes/cvodes.hpp"
 #include "core/tableau/tableaus.hpp"
-#include "optim/objective/evaluator.hpp"
 #include "optim/objective/integration_error.hpp"
-#include "optim/problem/parameter_values.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
@@ -19,9 +17,8 @@ using Eigen::MatrixXd;
 
 class ContinuousComparison {
  public:
-  ContinuousComparison(const Scene& scene, const std::vector<Objective>& objectives,
-                       const ContinuousCheckOptions& options)
-      : scene_(scene), objectives_(objectives), options_(options) {}
+  ContinuousComparison(const Evaluator& evaluator, const ContinuousCheckOptions& options)
+      : evaluator_(evaluator), scene_(evaluator.scene()), objectives_(evaluator.objectives()), options_(options) {}
 
   ContinuousCheck run() {
     const IntegratorSettings& given = scene_.simulation.integrator;
@@ -39,7 +36,7 @@ class ContinuousComparison {
       result_.message = "nothing is simulated";
       return std::move(result_);
     }
-    const GradientCost cost = gradient_cost(scene_.parameters.size(), count);
+    const GradientCost cost = gradient_cost(evaluator_.variables().size(), count);
     forward_ = cost.tlm <= cost.adjoint;
     const std::optional<MatrixXd> continuous = by_cvodes();
     if (!continuous) return std::move(result_);
@@ -96,8 +93,7 @@ class ContinuousComparison {
     const long steps = is_cvodes(scene_.simulation.integrator.type) ? 0 : options_.typical_steps;
     scene = with_errors_times(rtol / s.rtol, std::move(scene), steps);
     s.max_steps = std::min(s.max_steps, std::max(kAtLeast, kManyTimes * options_.typical_steps));
-    Evaluator evaluator(std::move(scene), objectives_, {}, {by, {}, options_.user_forces, options_.progress});
-    const Evaluation& e = evaluator.gradients(evaluator.start());
+    const Evaluation e = evaluator_.in(std::move(scene), by).gradients(evaluator_.start());
     result_.simulations += e.simulations;
     if (is_cvodes(type)) result_.wall_seconds = e.wall_seconds;
     *message = e.message;
@@ -134,17 +130,13 @@ class ContinuousComparison {
 
   void set_entries(const MatrixXd& continuous, const MatrixXd& discrete, const MatrixXd& error) {
     result_.entries.clear();
-    Eigen::VectorXd size(discrete.cols());
-    for (Index k = 0; k < size.size(); ++k) {
-      const Parameter& p = scene_.parameters[static_cast<std::size_t>(k)];
-      size(k) = typical_size(p, p.value);
-    }
+    const Eigen::VectorXd size = evaluator_.sizes(evaluator_.start());
     for (Index i = 0; i < discrete.rows(); ++i) {
       const double largest = discrete.row(i).cwiseAbs().cwiseProduct(size.transpose()).maxCoeff();
       for (Index k = 0; k < discrete.cols(); ++k) {
         ContinuousEntry e;
         e.objective = objectives_[static_cast<std::size_t>(i)].name();
-        e.parameter = scene_.parameters[static_cast<std::size_t>(k)].name;
+        e.parameter = evaluator_.variable(k).name;
         e.discrete = discrete(i, k), e.continuous = continuous(i, k);
         const double entry =
             std::max({std::abs(e.discrete), std::abs(e.continuous), options_.floor * largest / size(k)});
@@ -160,6 +152,7 @@ class ContinuousComparison {
     }
   }
 
+  const Evaluator& evaluator_;
   const Scene& scene_;
   const std::vector<Objective>& objectives_;
   const ContinuousCheckOptions& options_;
@@ -192,9 +185,8 @@ Verdict ContinuousCheck::worst_verdict(const std::string& objective) const {
   return worst;
 }
 
-ContinuousCheck check_continuous(const Scene& scene, const std::vector<Objective>& objectives,
-                                 const ContinuousCheckOptions& options) {
-  return ContinuousComparison(scene, objectives, options).run();
+ContinuousCheck check_continuous(const Evaluator& evaluator, const ContinuousCheckOptions& options) {
+  return ContinuousComparison(evaluator, options).run();
 }
 
 }  // namespace mbsopt::inline optim

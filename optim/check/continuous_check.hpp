@@ -2,19 +2,16 @@
 // derivatives. Both have tolerances tight enough to be the same number. They share the derivatives of single terms, and
 // assembly. They do not share the steps, the projection, the dense output, and the quadrature of running costs.
 //
-//   const ContinuousCheck check = check_continuous(scene, objectives);
+//   const ContinuousCheck check = check_continuous(Evaluator(scene, objectives));
 //   if (check.ran) std::cout << check.method << ": " << check.worst_difference();
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "core/scene/scene.hpp"
-#include "optim/check/gradient_timing.hpp"
 #include "optim/differences/verdict.hpp"
+#include "optim/objective/evaluator.hpp"
 
 namespace mbsopt::inline optim {
 
@@ -45,14 +42,11 @@ struct ContinuousCheckOptions {
   double threshold = 1e-6;
   double floor = 1e-3;     // entries below this part of the largest are compared to that part
   long typical_steps = 0;  // of the scene's own run, 0: unknown; CVODES ends at many times these
-  std::vector<std::shared_ptr<const UserForce>> user_forces = {};
-  std::function<bool(double t)> progress = {};
 };
 
-// Checks the gradients in all parameters at their values in the scene. If an entry is off by more than the threshold,
-// both sides run once more at ten times tighter tolerances, and these decide. The change between the runs excuses the
-// rest.
-ContinuousCheck check_continuous(const Scene& scene, const std::vector<Objective>& objectives,
-                                 const ContinuousCheckOptions& options = {});
+// Checks the gradients in the variables of the evaluator at their values in the scene. If an entry is off by more than
+// the threshold, both sides run once more at ten times tighter tolerances, and these decide. The change between the
+// runs excuses the rest.
+ContinuousCheck check_continuous(const Evaluator& evaluator, const ContinuousCheckOptions& options = {});
 
 }  // namespace mbsopt::inline optim

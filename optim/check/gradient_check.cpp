@@ -42,25 +42,20 @@ class Check {
       : scene_(scene),
         objectives_(objectives),
         options_(options),
-        adjoint_(evaluator(GradientMethod::adjoint)),
-        tlm_(evaluator(GradientMethod::tlm)) {
+        run_{Evaluator(scene, objectives, {},
+                       {.user_forces = options.user_forces, .progress = options.simulation_progress})} {
     for (const Objective& objective : objectives) result_.objectives.push_back(objective.name());
     for (const Parameter& p : scene.parameters) result_.parameters.push_back(p.name);
-    rho_ = adjoint_.start();
-    size_.resize(rho_.size());
-    for (Index k = 0; k < rho_.size(); ++k)
-      size_(k) = typical_size(scene.parameters[static_cast<std::size_t>(k)], rho_(k));
   }
 
   GradientCheck run() {
     if (!base_runs()) return std::move(result_);
     result_.ran = true;
-    result_.discrete = !is_cvodes(scene_.simulation.integrator.type);
-    differences_.emplace(
-        GradientDifferences::Base{result_.psi, rho_, size_, steps_, result_.discrete, parameters_on_frozen_steps()},
-        GradientDifferences::Settings{options_.relative_step, options_.rungs, options_.free_steps},
-        [this](const VectorXd& rho, bool frozen) { return run_at(rho, frozen); });
-    rounding_.psi.setZero(result_.psi.size()), rounding_.psi_rho.setZero(result_.psi.size(), rho_.size());
+    result_.discrete = run_.discrete = !is_cvodes(scene_.simulation.integrator.type);
+    run_.on_frozen_steps = parameters_on_frozen_steps();
+    differences_.emplace(run_,
+                         GradientDifferences::Settings{options_.relative_step, options_.rungs, options_.free_steps});
+    rounding_.psi.setZero(result_.psi.size()), rounding_.psi_rho.setZero(result_.psi.size(), run_.rho.size());
     measure_times();
     difference();
     estimate_integration_error();
@@ -86,38 +81,29 @@ class Check {
     }
     compare_with_cvodes();
     result_.wrong_terms = wrong_user_terms(scene_, objectives_, options_.user_forces, options_.simulation_progress);
-    result_.simulations += adjoint_.simulations() + tlm_.simulations();
+    result_.simulations += run_.simulations;
     return std::move(result_);
   }
 
  private:
-  Evaluator evaluator(GradientMethod method) const { return evaluator(scene_, method); }
-  Evaluator evaluator(Scene scene, GradientMethod method) const {
-    EvaluatorOptions options;
-    options.method = method;
-    options.user_forces = options_.user_forces;
-    options.progress = options_.simulation_progress;
-    return Evaluator(std::move(scene), objectives_, {}, options);
-  }
-
   bool base_runs() {
-    for (Evaluator* e : {&tlm_, &adjoint_}) {
-      const Evaluation& base = e->gradients(rho_);
-      result_.statistics = base.statistics, result_.warnings = base.warnings;
-      if (!base.ok) {
-        result_.message = base.message;
+    for (Evaluation* const e : {&tlm_, &adjoint_}) {
+      const GradientMethod method = e == &tlm_ ? GradientMethod::tlm : GradientMethod::adjoint;
+      *e = run_.counted(run_.evaluator.in(scene_, method).gradients(run_.rho));
+      result_.statistics = e->statistics, result_.warnings = e->warnings;
+      if (!e->ok) {
+        result_.message = e->message;
         return false;
       }
-      (e == &tlm_ ? result_.tlm : result_.adjoint) = base.psi_rho;
-      result_.psi = base.psi;
-      steps_ = base.steps;
     }
+    result_.tlm = tlm_.psi_rho, result_.adjoint = adjoint_.psi_rho;
+    result_.psi = run_.psi = tlm_.psi = adjoint_.psi, run_.steps = adjoint_.steps;
     return true;
   }
 
   // Steps that end at kinks miss them when a parameter moves the kinks. Differences then need steps of their own.
   Eigen::Array<bool, Eigen::Dynamic, 1> parameters_on_frozen_steps() {
-    const Mechanism mechanism(scene_, rho_, {}, options_.user_forces);
+    const Mechanism mechanism = run_.evaluator.mechanism(run_.rho, true);
     std::vector<Cost> costs;
     for (const Objective& objective : objectives_)
       if (objective.needs_simulation()) costs.push_back(objective.cost(mechanism));
@@ -125,7 +111,7 @@ class Check {
     for (const KinkedSignal& kinks : kinks_of(mechanism, costs))
       moving.insert(kinks.moved_by.begin(), kinks.moved_by.end());
     Eigen::Array<bool, Eigen::Dynamic, 1> frozen =
-        Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(rho_.size(), result_.discrete);
+        Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(run_.rho.size(), result_.discrete);
     std::string names;
     for (const int k : moving) {
       frozen(k) = false;
@@ -141,37 +127,17 @@ class Check {
     GradientTimingOptions timing_options = options_.timing;
     timing_options.user_forces = options_.user_forces;
     timing_options.progress = options_.simulation_progress;
-    const GradientTiming timing = time_gradients(scene_, objectives_, timing_options);
-    result_.simulation = timing.simulation, result_.tlm_cost = timing.tlm, result_.adjoint_cost = timing.adjoint;
-    result_.timing_rounds = timing.rounds;
-    result_.simulations += timing.simulations;
+    result_.timing = time_gradients(scene_, objectives_, timing_options);
+    result_.simulations += result_.timing.simulations;
   }
 
   void set_ratio(MethodCost& cost) const {
-    const double one = result_.simulation.wall_seconds;
+    const double one = result_.timing.simulation.wall_seconds;
     cost.ratio = one > 0 ? cost.wall_seconds / one : 0;
   }
 
-  Evaluation run_at(const VectorXd& rho, bool frozen) {
-    Evaluation e;
-    if (frozen) {
-      e = tlm_.values_on(steps_, rho);
-    } else {
-      Evaluator fresh = evaluator(GradientMethod::automatic);
-      e = fresh.values(rho);
-    }
-    result_.simulations += e.simulations;
-    return e;
-  }
-
-  std::optional<VectorXd> psi_at(const VectorXd& rho, bool frozen) {
-    Evaluation e = run_at(rho, frozen);
-    if (!e.ok) return std::nullopt;
-    return std::move(e.psi);
-  }
-
   void difference() {
-    const Index P = rho_.size();
+    const Index P = run_.rho.size();
     for (Index k = 0; k < P; ++k) {
       for (const bool frozen : {true, false}) {
         if (!differences_->takes(k, frozen)) continue;
@@ -190,11 +156,11 @@ class Check {
   // Repeats differences that disagree with smaller steps. Returns whether one of them changed.
   bool difference_finer() {
     bool found = false;
-    for (Index k = 0; k < rho_.size(); ++k) {
+    for (Index k = 0; k < run_.rho.size(); ++k) {
       for (const bool frozen : {true, false}) {
         std::vector<Index> disagreeing;
         for (Index i = 0; i < result_.psi.size(); ++i) {
-          const CheckedEntry& e = result_.entries[static_cast<std::size_t>(i * rho_.size() + k)];
+          const CheckedEntry& e = result_.entries[static_cast<std::size_t>(i * run_.rho.size() + k)];
           const std::optional<Verdict>& verdict = frozen ? e.frozen_verdict : e.free_verdict;
           if (verdict && !passes(*verdict)) disagreeing.push_back(i);
         }
@@ -205,42 +171,31 @@ class Check {
   }
 
   void estimate_integration_error() {
-    excused_.setZero(result_.psi.size(), rho_.size());
+    excused_.setZero(result_.psi.size(), run_.rho.size());
     if (!options_.free_steps && result_.discrete) return;
-    const auto error_of = [&](GradientMethod method, const MatrixXd& psi_rho) {
-      IntegrationError e = integration_error(scene_, objectives_, result_.psi, psi_rho,
-                                             {.user_forces = options_.user_forces,
-                                              .progress = options_.simulation_progress,
-                                              .method = method,
-                                              .steps = result_.statistics.steps});
+    const auto error_of = [&](const Evaluation& at, GradientMethod method) {
+      const IntegrationError e = integration_error(run_.evaluator, at, method);
       result_.simulations += e.simulations;
       return e;
     };
-    IntegrationError e = error_of(result_.discrete ? GradientMethod::automatic : GradientMethod::tlm, result_.tlm);
-    for (std::string& doubt : unresolved_gradients(scene_, objectives_, result_.psi, result_.tlm, e))
+    IntegrationError e = error_of(tlm_, result_.discrete ? GradientMethod::automatic : GradientMethod::tlm);
+    for (std::string& doubt : unresolved_gradients(run_.evaluator, tlm_, e))
       result_.warnings.push_back(std::move(doubt));
-    if (!result_.discrete) {  // forward and backward have errors of their own
-      e.psi_rho += error_of(GradientMethod::adjoint, result_.adjoint).psi_rho;
-    }
+    if (!result_.discrete)  // forward and backward have errors of their own
+      e.psi_rho += error_of(adjoint_, GradientMethod::adjoint).psi_rho;
     // Unresolved derivatives change with the tolerances. That excuses them up to kExcused of the largest, or what the
     // tolerance leaves. Beyond it, differences decide.
     constexpr double kExcused = 1e-4, kDigitsFewer = 1e3;
     const double excused = std::max(kExcused, kDigitsFewer * scene_.simulation.integrator.rtol) / kEstimateTrust;
-    const VectorXd largest = (result_.tlm.cwiseAbs() * size_.asDiagonal()).rowwise().maxCoeff();
-    excused_ = excused * largest * size_.cwiseInverse().transpose();
+    const VectorXd largest = (result_.tlm.cwiseAbs() * run_.size.asDiagonal()).rowwise().maxCoeff();
+    excused_ = excused * largest * run_.size.cwiseInverse().transpose();
     e.psi_rho = e.psi_rho.cwiseMin(excused_);
     differences_->add(std::move(e));
   }
 
   // Runs only if something disagrees.
   void measure_rounding() {
-    const RoundingRuns runs{
-        [&](const VectorXd& rho, GradientMethod method) { return tlm_.gradients_on(steps_, rho, method); },
-        [&](const Scene& scene, GradientMethod method) {
-          return evaluator(scene, method).gradients_on(steps_, rho_, method);
-        }};
-    rounding_ = rounding_scatter({scene_, rho_, size_, result_.psi, kPsiRounding, options_.seed}, runs);
-    result_.simulations += rounding_.simulations;
+    rounding_ = rounding_scatter(run_, options_.seed);
     rounding_known_ = true;
   }
 
@@ -252,7 +207,7 @@ class Check {
     const MatrixXd rounding = rounding_.psi_rho.cwiseMax((result_.tlm - result_.adjoint).cwiseAbs());
     for (std::size_t n = 0; n < check.entries.size(); ++n) {
       ContinuousEntry& e = check.entries[n];
-      const Index at = static_cast<Index>(n), P = rho_.size();
+      const Index at = static_cast<Index>(n), P = run_.rho.size();
       const double entry = std::max(std::abs(e.discrete), std::abs(e.continuous));
       if (!passes(e.verdict))
         e.verdict =
@@ -288,7 +243,7 @@ class Check {
   void say_kinks() {
     for (std::size_t n = 0; n < result_.entries.size(); ++n) {
       const CheckedEntry& e = result_.entries[n];
-      const Index i = static_cast<Index>(n) / rho_.size(), k = static_cast<Index>(n) % rho_.size();
+      const Index i = static_cast<Index>(n) / run_.rho.size(), k = static_cast<Index>(n) % run_.rho.size();
       const auto failed = [](const std::optional<Verdict>& v) { return v && !passes(*v); };
       const bool frozen = failed(e.frozen_verdict);
       if (!frozen && !failed(e.free_verdict)) continue;
@@ -308,7 +263,7 @@ class Check {
   // Entries of an objective below this size are compared with it.
   double floor_of(Index objective, Index k) const {
     return options_.thresholds.rounding_floor *
-           result_.tlm.row(objective).cwiseAbs().cwiseProduct(size_.transpose()).maxCoeff() / size_(k);
+           result_.tlm.row(objective).cwiseAbs().cwiseProduct(run_.size.transpose()).maxCoeff() / run_.size(k);
   }
 
   void compare() {
@@ -317,7 +272,7 @@ class Check {
     const GradientDifferences::Table &on_frozen = differences_->of(true), &on_free = differences_->of(false);
     result_.frozen = on_frozen.derivative, result_.free = on_free.derivative;
     for (Index i = 0; i < result_.psi.size(); ++i) {
-      for (Index k = 0; k < rho_.size(); ++k) {
+      for (Index k = 0; k < run_.rho.size(); ++k) {
         CheckedEntry e;
         e.objective = result_.objectives[static_cast<std::size_t>(i)];
         e.parameter = result_.parameters[static_cast<std::size_t>(k)];
@@ -339,7 +294,7 @@ class Check {
                                : verdict_of(e.adjoint, rounding_.psi_rho(i, k), e.tlm, std::max(entry, floor),
                                             limits.tlm_adjoint);
           e.frozen_error += rounding(on_frozen.step);
-          if (differences_->on_frozen_steps(k))
+          if (run_.on_frozen_steps(k))
             e.frozen_verdict = verdict_of(e.frozen, e.frozen_error, e.tlm, entry, limits.frozen);
         } else {
           e.exact = verdict_of(e.adjoint, differences_->integration().psi_rho(i, k), e.tlm, std::max(entry, floor),
@@ -357,12 +312,9 @@ class Check {
 
   void compare_with_cvodes() {
     if (!options_.continuous) return;
-    ContinuousCheckOptions options;
-    options.threshold = options_.thresholds.continuous, options.floor = options_.thresholds.rounding_floor;
-    options.typical_steps = result_.statistics.steps;
-    options.user_forces = options_.user_forces;
-    options.progress = options_.simulation_progress;
-    result_.continuous = check_continuous(scene_, objectives_, options);
+    result_.continuous = check_continuous(run_.evaluator, {.threshold = options_.thresholds.continuous,
+                                                           .floor = options_.thresholds.rounding_floor,
+                                                           .typical_steps = result_.statistics.steps});
     result_.simulations += result_.continuous->simulations;
     excuse_rounding(*result_.continuous);
     outvote(*result_.continuous);
@@ -398,7 +350,7 @@ class Check {
     constexpr int kDirections = 3;
     result_.identities.clear();
     for (int i = 0; i < kDirections; ++i) {
-      const VectorXd d = random_direction(rho_.size()).cwiseProduct(size_);
+      const VectorXd d = random_direction(run_.rho.size()).cwiseProduct(run_.size);
       const VectorXd w = random_direction(result_.psi.size());
       IdentityCheck check;
       check.d = d, check.w = w;
@@ -415,25 +367,22 @@ class Check {
 
   void check_taylor() {
     const double allowed = options_.thresholds.frozen / kTaylorClear;  // of a derivative, as in differences
-    VectorXd d = random_direction(rho_.size()).cwiseProduct(differences_->size_of_steps()) /
-                 std::sqrt(static_cast<double>(rho_.size()));
+    VectorXd d = random_direction(run_.rho.size()).cwiseProduct(differences_->size_of_steps()) /
+                 std::sqrt(static_cast<double>(run_.rho.size()));
     for (Index k = 0; k < d.size(); ++k)
-      if (!differences_->on_frozen_steps(k)) d(k) = 0;
-    const auto psi_there = [&](double h) { return psi_at(rho_ + h * d, true); };
+      if (!run_.on_frozen_steps(k)) d(k) = 0;
     const auto rounding = [&](double h, const VectorXd& psi) -> VectorXd {
       return (kPsiRounding * psi.cwiseAbs().cwiseMax(result_.psi.cwiseAbs())).cwiseMax(rounding_.psi) +
              h * (rounding_.psi_rho + allowed * result_.tlm.cwiseAbs()) * d.cwiseAbs();
     };
-    result_.taylor = check_taylor_remainders(result_.objectives, result_.psi, {psi_there, rounding, result_.tlm * d},
-                                             options_.thresholds.taylor_slope);
+    result_.taylor = check_taylor_remainders(run_, d, result_.tlm * d, rounding, options_.thresholds.taylor_slope);
   }
 
   const Scene& scene_;
   const std::vector<Objective>& objectives_;
   const GradientCheckOptions& options_;
-  Evaluator adjoint_, tlm_;
-  VectorXd rho_, size_;
-  StepSequence steps_;
+  CheckedRun run_;
+  Evaluation tlm_, adjoint_;
   std::optional<GradientDifferences> differences_;
   RoundingScatter rounding_;  // 0 if it was not measured
   MatrixXd excused_;          // what the integration error of a derivative excuses at most

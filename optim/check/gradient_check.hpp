@@ -82,8 +82,8 @@ struct GradientCheck {
   std::vector<IdentityCheck> identities;
   bool discrete = true;                       // false: tlm and adjoint are sensitivities by CVODES
   std::optional<ContinuousCheck> continuous;  // set if requested
-  MethodCost simulation, tlm_cost, adjoint_cost, frozen_cost, free_cost;  // differences: of all of them
-  int timing_rounds = 0;
+  GradientTiming timing;
+  MethodCost frozen_cost, free_cost;     // of all differences
   SimulationStatistics statistics;       // of the base run
   std::vector<std::string> warnings;     // of the base run, and explanations of disagreement, in sentences
   std::vector<std::string> wrong_terms;  // of forces and costs written in C++ (user_terms.hpp), sentences

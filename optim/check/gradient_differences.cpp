@@ -22,22 +22,22 @@ bool on_base_steps(const VectorXd& largest, Index i, double other_steps) { retur
 
 }  // namespace
 
-GradientDifferences::GradientDifferences(Base base, const Settings& settings, Run run)
-    : base_(std::move(base)), settings_(settings), run_(std::move(run)), size_of_steps_(base_.size) {
-  const Index m = base_.psi.size(), P = base_.rho.size();
+GradientDifferences::GradientDifferences(CheckedRun& run, const Settings& settings)
+    : run_(run), settings_(settings), size_of_steps_(run.size) {
+  const Index m = run_.psi.size(), P = run_.rho.size();
   for (Table* table : {&frozen_, &free_}) {
     for (MatrixXd* x : {&table->derivative, &table->error, &table->step}) x->setZero(m, P);
   }
   for (Index k = 0; k < P; ++k) {
-    if (base_.discrete && !base_.on_frozen_steps(k)) frozen_.derivative.col(k).setConstant(kNaN);
+    if (run_.discrete && !run_.on_frozen_steps(k)) frozen_.derivative.col(k).setConstant(kNaN);
   }
   jump_.setZero(m, P);
   on_base_steps_.setConstant(m, P, false);
 }
 
 std::string GradientDifferences::take(Index k, bool frozen) {
-  const Ladder found = ladder(k, frozen, settings_.relative_step * base_.size(k));
-  for (Index i = 0; i < base_.psi.size(); ++i) keep(found, i, k, frozen);
+  const Ladder found = ladder(k, frozen, settings_.relative_step * run_.size(k));
+  for (Index i = 0; i < run_.psi.size(); ++i) keep(found, i, k, frozen);
   return found.d.derivative.hasNaN() ? found.failure : "";
 }
 
@@ -47,7 +47,7 @@ std::string GradientDifferences::take(Index k, bool frozen) {
 bool GradientDifferences::take_finer(Index k, bool frozen, const std::vector<Index>& objectives,
                                      const VectorXd& psi_rounding) {
   if (objectives.empty()) return false;
-  const Ladder finer = ladder(k, frozen, settings_.relative_step * base_.size(k) * std::pow(0.5, settings_.rungs));
+  const Ladder finer = ladder(k, frozen, settings_.relative_step * run_.size(k) * std::pow(0.5, settings_.rungs));
   bool found = false;
   for (const Index i : objectives) {
     const double change = std::abs(finer.d.derivative(i) - of(frozen).derivative(i, k));
@@ -60,17 +60,17 @@ bool GradientDifferences::take_finer(Index k, bool frozen, const std::vector<Ind
   return found;
 }
 
-// Takes steps of `largest` and below.
+// Takes steps of `largest` and below. Both ladders take the same steps h, halved exactly.
 GradientDifferences::Ladder GradientDifferences::ladder(Index k, bool frozen, double largest) {
   Ladder ladder;
   const auto f = [&](double h) -> std::optional<VectorXd> {
-    VectorXd rho = base_.rho;
+    VectorXd rho = run_.rho;
     rho(k) += h;
-    Evaluation e = run_(rho, frozen);
+    Evaluation e = run_.values(rho, frozen);
     if (!e.ok) ladder.failure = e.message;
     if (!e.ok) return std::nullopt;
-    if (e.steps.sizes != base_.steps.sizes) ladder.other_steps = std::min(ladder.other_steps, std::abs(h));
-    note(k, h, frozen, e.psi);
+    if (e.steps.sizes != run_.steps.sizes) ladder.other_steps = std::min(ladder.other_steps, std::abs(h));
+    rungs_[{k, std::abs(h)}][frozen ? 0 : 1][h > 0 ? 0 : 1] = e.psi;
     const double near = largest * std::pow(0.5, settings_.rungs - kJumpRungs);
     if (!frozen && h < 0 && std::abs(h) < 1.5 * near) {
       const auto& [on_base, on_free] = rungs_.at({k, std::abs(h)});
@@ -81,15 +81,10 @@ GradientDifferences::Ladder GradientDifferences::ladder(Index k, bool frozen, do
     }
     return std::move(e.psi);
   };
-  ladder.d = difference_ladder(f, base_.psi.size(), {largest, settings_.rungs, kPsiRounding});
-  for (Index i = 0; i < base_.psi.size(); ++i)
+  ladder.d = difference_ladder(f, run_.psi.size(), {largest, settings_.rungs, kPsiRounding});
+  for (Index i = 0; i < run_.psi.size(); ++i)
     if (!ladder.d.has_estimate(i)) ladder.d.derivative(i) = kNaN, ladder.d.error(i) = kInfinity;
   return ladder;
-}
-
-// Both ladders take the same steps h, halved exactly.
-void GradientDifferences::note(Index k, double h, bool frozen, const VectorXd& psi) {
-  rungs_[{k, std::abs(h)}][frozen ? 0 : 1][h > 0 ? 0 : 1] = psi;
 }
 
 void GradientDifferences::keep(const Ladder& ladder, Index i, Index k, bool frozen) {
@@ -97,7 +92,7 @@ void GradientDifferences::keep(const Ladder& ladder, Index i, Index k, bool froz
   table.derivative(i, k) = ladder.d.derivative(i);
   table.error(i, k) = ladder.d.error(i);
   table.step(i, k) = ladder.d.step(i);
-  if (!frozen && base_.discrete) on_base_steps_(i, k) = on_base_steps(ladder.d.largest, i, ladder.other_steps);
+  if (!frozen && run_.discrete) on_base_steps_(i, k) = on_base_steps(ladder.d.largest, i, ladder.other_steps);
 }
 
 // Sums the errors of the ladder, of psi's rounding and, on free steps, of the integration.
@@ -116,8 +111,8 @@ double GradientDifferences::own_error(const Ladder& ladder, Index i, Index k, bo
 void GradientDifferences::add(IntegrationError integration) {
   integration_ = std::move(integration);
   if (!settings_.free_steps) return;
-  for (Index k = 0; k < base_.rho.size(); ++k)
-    for (Index i = 0; i < base_.psi.size(); ++i) add_integration_error(i, k);
+  for (Index k = 0; k < run_.rho.size(); ++k)
+    for (Index i = 0; i < run_.psi.size(); ++i) add_integration_error(i, k);
 }
 void GradientDifferences::add_integration_error(Index i, Index k) {
   if (!on_base_steps_(i, k) && std::isfinite(free_.error(i, k)))
@@ -146,7 +141,7 @@ double GradientDifferences::kink(Index i, Index k, bool frozen, double psi_round
   for (auto rung = rungs_.rbegin(); rung != rungs_.rend(); ++rung) {
     const auto& [plus, minus] = rung->second[frozen ? 0 : 1];
     if (rung->first.first != k || plus.size() == 0 || minus.size() == 0) continue;
-    const double bend = plus(i) + minus(i) - 2 * base_.psi(i);
+    const double bend = plus(i) + minus(i) - 2 * run_.psi(i);
     if (!(std::abs(bend) > kEstimateTrust * psi_rounding)) break;
     wider = b, b = bend / (2 * rung->first.second);
   }

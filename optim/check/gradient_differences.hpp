@@ -1,28 +1,25 @@
 // Differences of all objectives in all parameters for the gradient check. The frozen ones use the accepted steps of the
 // base run, the free ones step-size control. Each uses a ladder of steps whose values are kept.
 //
-//   GradientDifferences differences(base, settings, run);
+//   GradientDifferences differences(run, {.relative_step = 1e-2, .rungs = 8, .free_steps = true});
 //   const std::string failure = differences.take(k, true);       // in parameter k, on frozen steps
 //   differences.of(true).derivative(i, k), differences.of(true).error(i, k);
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
-#include <functional>
 #include <limits>
 #include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "optim/check/checked_run.hpp"
 #include "optim/differences/difference_ladder.hpp"
-#include "optim/objective/evaluator.hpp"
 #include "optim/objective/integration_error.hpp"
 
 namespace mbsopt::inline optim {
 
-// psi carries the rounding of all steps: some units in the last place of the largest numbers in it.
-inline constexpr double kPsiRounding = 100 * std::numeric_limits<double>::epsilon();
 // psi(h) + psi(-h) - 2 psi(0), divided by h, halves from 2h to h where psi is smooth, and is constant at a kink.
 inline constexpr double kKinkFalls = 0.75;
 
@@ -34,29 +31,20 @@ struct LadderRung {
 
 class GradientDifferences {
  public:
-  // The run whose gradient is checked.
-  struct Base {
-    Eigen::VectorXd psi, rho, size;  // size: of each parameter
-    StepSequence steps;
-    bool discrete = true;  // other runs may take its steps
-    // The parameters in which differences on these steps serve.
-    Eigen::Array<bool, Eigen::Dynamic, 1> on_frozen_steps;
-  };
   struct Settings {
     double relative_step;  // the largest of a ladder, of the parameter's size
     int rungs;
     bool free_steps;
   };
-  using Run = std::function<Evaluation(const Eigen::VectorXd& rho, bool frozen)>;
 
   // Objective x parameter. An entry without a difference is 0, or NaN on frozen steps that do not serve.
   struct Table {
     Eigen::MatrixXd derivative, error, step;
   };
 
-  GradientDifferences(Base base, const Settings& settings, Run run);
+  GradientDifferences(CheckedRun& run, const Settings& settings);
 
-  bool takes(Eigen::Index k, bool frozen) const { return frozen ? base_.on_frozen_steps(k) : settings_.free_steps; }
+  bool takes(Eigen::Index k, bool frozen) const { return frozen ? run_.on_frozen_steps(k) : settings_.free_steps; }
   // Sets column k. If it finds no derivative, it returns the message of a failed run.
   std::string take(Eigen::Index k, bool frozen);
   // Replaces the entries of these objectives in k by those of smaller steps, if they differ by more than their own
@@ -68,7 +56,6 @@ class GradientDifferences {
 
   const Table& of(bool frozen) const { return frozen ? frozen_ : free_; }
   const IntegrationError& integration() const { return integration_; }
-  bool on_frozen_steps(Eigen::Index k) const { return base_.on_frozen_steps(k); }
   // The differences of each parameter step by relative_step times this: its size, or less if finer ones replaced them.
   const Eigen::VectorXd& size_of_steps() const { return size_of_steps_; }
 
@@ -88,11 +75,9 @@ class GradientDifferences {
   double own_error(const Ladder& ladder, Eigen::Index i, Eigen::Index k, bool frozen, double psi_rounding) const;
   void add_integration_error(Eigen::Index i, Eigen::Index k);
   double integration_error_of(Eigen::Index i, Eigen::Index k, double step) const;
-  void note(Eigen::Index k, double h, bool frozen, const Eigen::VectorXd& psi);
 
-  Base base_;
+  CheckedRun& run_;
   Settings settings_;
-  Run run_;
   Table frozen_, free_;
   IntegrationError integration_;
   Eigen::VectorXd size_of_steps_;

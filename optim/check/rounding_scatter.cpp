@@ -39,7 +39,6 @@ void note(F&& f, RoundingScatter& scatter) {
     std::optional<Evaluation> first;
     for (const double units : {8.0, 12.0, 16.0}) {
       const Evaluation e = f(units, method);
-      scatter.simulations += e.simulations;
       if (!e.ok) continue;
       if (!first) {
         first = e;
@@ -54,19 +53,22 @@ void note(F&& f, RoundingScatter& scatter) {
 
 }  // namespace
 
-RoundingScatter rounding_scatter(const RoundingBase& base, const RoundingRuns& runs) {
+RoundingScatter rounding_scatter(CheckedRun& run, unsigned seed) {
   constexpr double kUnit = std::numeric_limits<double>::epsilon();
-  RoundingScatter scatter{base.rounding * base.psi.cwiseAbs(), Eigen::MatrixXd::Zero(base.psi.size(), base.rho.size())};
+  RoundingScatter scatter{kPsiRounding * run.psi.cwiseAbs(), Eigen::MatrixXd::Zero(run.psi.size(), run.rho.size())};
   for (const double unit : {kUnit, -kUnit, 1e4 * kUnit, -1e4 * kUnit})
-    note([&](double units, GradientMethod method) { return runs.at(base.rho + units * unit * base.size, method); },
-         scatter);
+    note(
+        [&](double units, GradientMethod method) {
+          return run.frozen_gradients(VectorXd(run.rho + units * unit * run.size), method);
+        },
+        scatter);
   note(
       [&](double units, GradientMethod method) {
-        return runs.of(with_numbers_changed(base.scene, units * kUnit, base.seed), method);
+        return run.frozen_gradients(with_numbers_changed(run.evaluator.scene(), units * kUnit, seed), method);
       },
       scatter);
   // A parameter has no further effect if a change by its own size changes psi by less than its rounding.
-  scatter.psi_rho = scatter.psi_rho.cwiseMax(scatter.psi * base.size.cwiseInverse().transpose());
+  scatter.psi_rho = scatter.psi_rho.cwiseMax(scatter.psi * run.size.cwiseInverse().transpose());
   return scatter;
 }
 

@@ -47,20 +47,20 @@ std::optional<double> slope_of(const std::vector<TaylorRung>& rungs, Eigen::Inde
 
 }  // namespace
 
-std::vector<TaylorCheck> check_taylor_remainders(const std::vector<std::string>& objectives, const Eigen::VectorXd& psi,
-                                                 const TaylorLine& line, double least_slope) {
+std::vector<TaylorCheck> check_taylor_remainders(
+    CheckedRun& run, const Eigen::VectorXd& d, const Eigen::VectorXd& slope,
+    const std::function<Eigen::VectorXd(double h, const Eigen::VectorXd& psi)>& rounding, double least_slope) {
   constexpr int kRungs = 14;
   constexpr double kLargest = 1e-2;  // of d
   std::vector<TaylorRung> rungs;
   double h = kLargest;
-  for (int j = 0; j < kRungs; ++j, h /= 2) {
-    if (const std::optional<Eigen::VectorXd> there = line.psi(h))
-      rungs.push_back({h, (*there - psi - h * line.slope).cwiseAbs(), line.rounding(h, *there)});
-  }
+  for (int j = 0; j < kRungs; ++j, h /= 2)
+    if (const Evaluation there = run.values(run.rho + h * d, true); there.ok)
+      rungs.push_back({h, (there.psi - run.psi - h * slope).cwiseAbs(), rounding(h, there.psi)});
   std::vector<TaylorCheck> checks;
-  for (Eigen::Index i = 0; i < psi.size(); ++i) {
+  for (Eigen::Index i = 0; i < run.psi.size(); ++i) {
     TaylorCheck check;
-    check.objective = objectives[static_cast<std::size_t>(i)];
+    check.objective = run.evaluator.objectives()[static_cast<std::size_t>(i)].name();
     for (const TaylorRung& rung : rungs) check.rows.push_back({rung.h, rung.remainder(i)});
     check.slope = slope_of(rungs, i, least_slope);
     check.passed = !rungs.empty() && (!check.slope || *check.slope >= least_slope);

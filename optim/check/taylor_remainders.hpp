@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "optim/check/checked_run.hpp"
+
 namespace mbsopt::inline optim {
 
 // A remainder is clear of rounding if it exceeds it so many times.
@@ -26,14 +28,9 @@ struct TaylorCheck {
   bool passed = false;
 };
 
-struct TaylorLine {
-  std::function<std::optional<Eigen::VectorXd>(double h)> psi;                // at rho + h d; none where it fails
-  std::function<Eigen::VectorXd(double h, const Eigen::VectorXd&)> rounding;  // of R, with psi there
-  Eigen::VectorXd slope;                                                      // psi_rho d
-};
-
-// One check per objective, whose values at rho are psi. least_slope is that of log R over log h.
-std::vector<TaylorCheck> check_taylor_remainders(const std::vector<std::string>& objectives, const Eigen::VectorXd& psi,
-                                                 const TaylorLine& line, double least_slope);
+// One check per objective. slope: psi_rho d. rounding: of R, with psi there. least_slope: of log R over log h.
+std::vector<TaylorCheck> check_taylor_remainders(
+    CheckedRun& run, const Eigen::VectorXd& d, const Eigen::VectorXd& slope,
+    const std::function<Eigen::VectorXd(double h, const Eigen::VectorXd& psi)>& rounding, double least_slope);
 
 }  // namespace mbsopt::inline optim

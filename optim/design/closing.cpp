@@ -47,30 +47,21 @@ struct Defects {
   bool known = true;
 };
 
-Defects defects_at(const CaseEvaluator& evaluator, const VariableScaling& scaling, const VectorXd& x,
-                   const std::vector<std::vector<double>>& times) {
-  const VectorXd values = scaling.to_rho(x), rho_x = scaling.rho_x(x);
+Defects defects_at(const DesignProgram& program, const VectorXd& x, const std::vector<std::vector<double>>& times) {
+  const VectorXd rho = program.rho_at(x), rho_x = program.scaling().rho_x(x);
   Index rows = 0;
   for (const auto& of_case : times) rows += static_cast<Index>(of_case.size());
   Defects out{VectorXd::Zero(rows), MatrixXd::Zero(rows, x.size())};
   Index row = 0;
   for (std::size_t c = 0; c < times.size(); ++c) {
-    const Evaluator& of_case = evaluator.of_case(c);
-    VectorXd rho = of_case.start();
-    std::vector<bool> active(static_cast<std::size_t>(rho.size()), false);
-    for (Index k = 0; k < x.size(); ++k) {
-      const int parameter = of_case.variables()[static_cast<std::size_t>(k)];
-      rho(parameter) = values(k), active[static_cast<std::size_t>(parameter)] = true;
-    }
-    const Mechanism mechanism(of_case.scene(), rho, active, of_case.options().user_forces, of_case.programs());
+    const Evaluator& of_case = program.evaluator().of_case(c);
+    const Mechanism mechanism = of_case.mechanism(rho, true);
     if (!may_be_solved(mechanism, of_case.scene().simulation)) return {{}, {}, false};
     NearestApproach approach(mechanism, of_case.scene().simulation.start_time);
     VectorXd e_rho(rho.size());
     for (const double t : times[c]) {
       out.e(row) = approach.defect(t, e_rho);
-      for (Index k = 0; k < x.size(); ++k)
-        out.e_x(row, k) = rho_x(k) * e_rho(of_case.variables()[static_cast<std::size_t>(k)]);
-      ++row;
+      out.e_x.row(row++) = rho_x.cwiseProduct(e_rho(of_case.variables())).transpose();
     }
   }
   return out;
@@ -92,18 +83,18 @@ VectorXd reflection(const Defects& at, const VectorXd& sizes, const VectorXd& lo
 
 }  // namespace
 
-ClosedStart close_start(const CaseEvaluator& evaluator, const VariableScaling& scaling, const VectorXd& x_start,
-                        const std::function<bool()>& go_on) {
-  ClosedStart start{x_start};
+ClosedStart close_start(const DesignProgram& program, const std::function<bool()>& go_on) {
+  ClosedStart start{program.x_start()};
   std::vector<std::vector<double>> times;
-  for (std::size_t c = 0; c < evaluator.cases(); ++c) times.push_back(instants(evaluator.of_case(c)));
-  const VectorXd& lower = scaling.x_lower();
-  const VectorXd& upper = scaling.x_upper();
+  for (std::size_t c = 0; c < program.evaluator().cases(); ++c)
+    times.push_back(instants(program.evaluator().of_case(c)));
+  const VectorXd& lower = program.x_lower;
+  const VectorXd& upper = program.x_upper;
   const VectorXd ranges = upper - lower;
   const VectorXd sizes = ranges.unaryExpr([](double range) { return std::isfinite(range) && range > 0 ? range : 1.0; });
   while (true) {
     try {
-      const Defects at = defects_at(evaluator, scaling, start.x, times);
+      const Defects at = defects_at(program, start.x, times);
       if (!at.known || !at.e.allFinite() || !at.e_x.allFinite()) return start;
       if (start.steps == 0) start.defect = at.e.maxCoeff();
       if (at.e.maxCoeff() <= 0) {

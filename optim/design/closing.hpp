@@ -9,15 +9,14 @@
 // after finitely many steps; projections end on its border, the dead points. Motzkin and Schoenberg, Canadian Journal
 // of Mathematics 6 (1954) 393.
 //
-//   const ClosedStart start = close_start(evaluator, scaling, x_start);
+//   const ClosedStart start = close_start(program);
 //   if (start.closes) use(start.x);
 #pragma once
 
 #include <Eigen/Core>
 #include <functional>
 
-#include "optim/objective/case_evaluator.hpp"
-#include "optim/problem/variable_scaling.hpp"
+#include "optim/design/design_program.hpp"
 
 namespace mbsopt::inline optim {
 
@@ -28,8 +27,7 @@ struct ClosedStart {
   double defect = 0;    // max e_k at the start [m, rad]
 };
 
-// go_on: asked before every step.
-ClosedStart close_start(const CaseEvaluator& evaluator, const VariableScaling& scaling, const Eigen::VectorXd& x_start,
-                        const std::function<bool()>& go_on = {});
+// From the start of the program. go_on: asked before every step.
+ClosedStart close_start(const DesignProgram& program, const std::function<bool()>& go_on = {});
 
 }  // namespace mbsopt::inline optim

@@ -7,9 +7,7 @@
 #include "core/scene/scene_error.hpp"
 #include "optim/design/closing.hpp"
 #include "optim/design/design_program.hpp"
-#include "optim/design/mode_design.hpp"
-#include "optim/design/prepared_design.hpp"
-#include "optim/design/single_design.hpp"
+#include "optim/design/design_search.hpp"
 #include "optim/problem/parameter_values.hpp"
 
 namespace mbsopt::inline optim {
@@ -30,28 +28,26 @@ Problem closed(const Problem& given, const DesignOptions& options, int& steps) {
         abandoned || (options.simulation_progress && !options.simulation_progress(given.scene.simulation.start_time));
     return !abandoned;
   };
-  const PreparedDesign prepared(given, options, options.simulation_progress);
-  const ClosedStart start = close_start(prepared.evaluator, prepared.scaling, prepared.x_start, go_on);
+  const DesignProgram program(given, options);
+  const ClosedStart start = close_start(program, go_on);
   steps = start.closes ? start.steps : 0;
   if (steps == 0) return given;
   Problem problem = given;
-  const Eigen::VectorXd values = prepared.scaling.to_rho(start.x);
-  for (std::size_t k = 0; k < prepared.evaluator.variables().size(); ++k)
-    problem.scene.parameters[static_cast<std::size_t>(prepared.evaluator.variables()[k])].value =
-        values(static_cast<Eigen::Index>(k));
+  const Eigen::VectorXd rho = program.rho_at(start.x);
+  for (const int k : program.evaluator().variables())
+    problem.scene.parameters[static_cast<std::size_t>(k)].value = rho(k);
   return problem;
 }
 
 }  // namespace
 
 std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options) {
-  return PreparedDesign(problem, options, options.simulation_progress).spec.sharpness;
+  return DesignProgram(problem, options).spec().sharpness;
 }
 
 NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
-  PreparedDesign p(problem, options, options.simulation_progress);
-  DesignProgram program(p.spec, p.evaluator, p.scaling, p.objective());
-  program.start_from(p.x_start);
+  DesignProgram program(problem, options);
+  program.start_from(program.x_start());
   return {program.f_scale, program.c_scale};
 }
 

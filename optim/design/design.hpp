@@ -12,7 +12,6 @@
 
 #include <optional>
 
-#include "optim/design/design_options.hpp"
 #include "optim/design/design_result.hpp"
 #include "optim/problem/problem.hpp"
 

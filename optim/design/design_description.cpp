@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/expression/did_you_mean.hpp"
-#include "optim/design/prepared_design.hpp"
 #include "optim/design/true_limits.hpp"
 #include "optim/solver/optimality.hpp"
 
@@ -26,16 +25,14 @@ bool touches(double value, const std::optional<double>& bound, double size) {
 
 // Warns of variables whose derivatives are all exactly zero: by symmetry, or because their force does not act yet. The
 // search does not move them.
-std::vector<std::string> idle_variables(const Evaluation& start, const Problem& problem) {
-  std::vector<std::string> warnings;
-  for (std::size_t k = 0; k < problem.design->variables.size(); ++k) {
-    if (start.psi_rho.col(static_cast<Eigen::Index>(k)).any()) continue;
-    warnings.push_back(fmt::format(
-        "design.variables: '{}' has a derivative of exactly 0 at the start in all that the design uses ({}); it stays "
-        "as it is unless others change that",
-        problem.design->variables[k], joined(objective_names(*problem.design))));
-  }
-  return warnings;
+void warn_of_idle_variables(const Evaluation& start, const DesignSpec& spec, DesignResult& result) {
+  for (std::size_t k = 0; k < spec.variables.size(); ++k)
+    if (!start.psi_rho.col(static_cast<Eigen::Index>(k)).any())
+      result.warnings.push_back(
+          fmt::format("design.variables: '{}' has a derivative of exactly 0 at the start in all that the design uses "
+                      "({}); it stays "
+                      "as it is unless others change that",
+                      spec.variables[k], joined(objective_names(spec))));
 }
 
 double missed(const DesignConstraint& c, double value) {
@@ -47,8 +44,8 @@ std::string limit_text(const std::string& name, bool is_upper, double bound) {
 }
 
 // The limits and bounds that stand against each other where no point near satisfies all limits.
-void describe_conflict(const DesignProgram& program, const VariableScaling& scaling, const Eigen::VectorXd& x,
-                       const NlpPoint& end, DesignResult& result) {
+void describe_conflict(const DesignProgram& program, const Eigen::VectorXd& x, const NlpPoint& end,
+                       DesignResult& result) {
   constexpr double kNoPrice = 1e-6;  // relative to that of a limit that is violated, 1
   const Conflict found = conflict(program, x, end, kConstraintTolerance);
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
@@ -59,7 +56,7 @@ void describe_conflict(const DesignProgram& program, const VariableScaling& scal
                                 std::max(c.violation, c.true_violation),
                                 std::abs(z) / program.size(static_cast<Eigen::Index>(i))});
   }
-  const Eigen::VectorXd rho_x = scaling.rho_x(x);
+  const Eigen::VectorXd rho_x = program.scaling().rho_x(x);
   for (std::size_t k = 0; k < result.variables.size(); ++k) {
     const DesignVariable& v = result.variables[k];
     const Eigen::Index row = static_cast<Eigen::Index>(k);
@@ -97,38 +94,37 @@ void describe_objective(const DesignProgram& program, const std::vector<std::opt
 
 // Least squares converges by its steps. A solved run has no noise, so that its end must also satisfy the optimality
 // conditions.
-void judge_stationarity(const DesignSpec& spec, DesignResult& result) {
-  const bool judged = spec.optimizer.type == OptimizerSpec::kLeastSquares && result.final_evaluation.ok &&
-                      result.final_evaluation.of_cases.front().statistics.solved;
+void judge_stationarity(const OptimizerSpec& optimizer, DesignResult& result) {
+  const bool judged = optimizer.type == OptimizerSpec::kLeastSquares && result.final_evaluation.ok &&
+                      result.final_evaluation.statistics.solved;
   if (!judged || result.status != SolverStatus::converged) return;
-  if (result.optimality <= kSettled * spec.optimizer.tolerance) return;
-  result.status = SolverStatus::no_progress;
-  result.message = fmt::format(
-      "no further progress: cost and parameters settle where the optimality is {:.1g}, a kink "
-      "or a dead point",
-      result.optimality);
+  if (result.optimality <= kSettled * optimizer.tolerance) return;
+  result.end(SolverStatus::no_progress,
+             fmt::format("no further progress: cost and parameters settle where the optimality is {:.1g}, a kink "
+                         "or a dead point",
+                         result.optimality));
 }
 
 // Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
-void judge_true_extremes(const DesignProgram& program, const CaseEvaluator& evaluator, DesignResult& result) {
+void judge_true_extremes(const DesignProgram& program, DesignResult& result) {
   if (result.status == SolverStatus::infeasible) return;  // the conflicts name what is missed
   bool beyond = false;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     const DesignConstraint& c = result.constraints[i];
-    const std::size_t bounds = result.constraints.size() / evaluator.cases();
-    const Extreme extreme = evaluator.of_case(i / bounds).objectives()[i % bounds + 1].extreme();
+    const Extreme extreme = program.limited(static_cast<Eigen::Index>(i)).extreme();
     if (extreme == Extreme::none) continue;
     const char* const what = extreme == Extreme::maximum   ? "maximum"
                              : extreme == Extreme::minimum ? "minimum"
                                                            : "peak to peak value";
-    const std::string place = fmt::format("design.subject_to[{}]: the {} of '{}'", i % bounds, what, c.in_words());
+    const std::string place =
+        fmt::format("design.subject_to[{}]: the {} of '{}'", i % program.spec().subject_to.size(), what, c.in_words());
     if (!c.true_value) {
       beyond = true;
       result.warnings.push_back(place +
                                 " is held by its smooth value only; the run that was to find the true one failed");
       continue;
     }
-    const bool equality = c.lower && c.upper && *c.lower == *c.upper;
+    const bool equality = is_equality(c);
     const double tolerance = kTrueLimitTolerance * program.size(static_cast<Eigen::Index>(i));
     if (c.true_violation > (equality ? tolerance : 0)) {
       beyond = true;
@@ -153,39 +149,35 @@ void judge_true_extremes(const DesignProgram& program, const CaseEvaluator& eval
 
 }  // namespace
 
-void describe_start(const Problem& problem, const CaseEvaluator& evaluator, const DesignProgram& program,
-                    const CaseEvaluation& start, DesignResult& result) {
-  const DesignSpec& spec = *problem.design;
-  result.objective = spec.minimize;
-  for (const Parameter& p : chosen(problem.scene, evaluator.variables()))
+void describe_start(const DesignProgram& program, const Evaluation& start, DesignResult& result) {
+  const std::vector<CaseSpec>& cases = program.problem().cases;
+  result.objective = program.spec().minimize;
+  for (const Parameter& p : program.designed())
     result.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});
   const Eigen::VectorXd minimised =
-      start.ok ? program.minimised(start.psi) : Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evaluator.cases()));
+      start.ok ? program.minimised(start.psi) : Eigen::VectorXd::Zero(static_cast<Eigen::Index>(cases.size()));
   if (start.ok) result.objective_initial = result.objective_final = program.objective().value(minimised);
-  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+  for (std::size_t c = 0; c < cases.size(); ++c) {
     const double value = minimised(static_cast<Eigen::Index>(c));
-    result.cases.push_back({problem.cases[c].name, problem.cases[c].weight, value, value});
+    result.cases.push_back({cases[c].name, cases[c].weight, value, value});
   }
-  for (std::size_t c = 0; c < evaluator.cases(); ++c) {
-    for (const ObjectiveBound& bound : spec.subject_to) {
-      const Eigen::Index row = static_cast<Eigen::Index>(result.constraints.size());
-      const double value = start.ok ? start.psi(program.psi_of(row)) : 0;
-      DesignConstraint& constraint = result.constraints.emplace_back();
-      constraint.objective = bound.objective, constraint.lower = bound.lower, constraint.upper = bound.upper;
-      constraint.initial = constraint.value = value, constraint.load_case = evaluator.case_name(c);
-    }
+  for (Eigen::Index i = 0; i < program.constraints(); ++i) {
+    const ObjectiveBound& bound = program.bound(i);
+    DesignConstraint& constraint = result.constraints.emplace_back();
+    constraint.objective = bound.objective, constraint.lower = bound.lower, constraint.upper = bound.upper;
+    constraint.initial = constraint.value = start.ok ? start.psi(program.psi_of(i)) : 0;
+    constraint.load_case =
+        program.evaluator().case_name(static_cast<std::size_t>(i) / program.spec().subject_to.size());
   }
-  if (!start.ok) return;
-  for (std::string& warning : idle_variables(start, problem)) result.warnings.push_back(std::move(warning));
+  if (start.ok) warn_of_idle_variables(start, program.spec(), result);
 }
 
-void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, const NlpResult& solution,
-                  DesignResult& result) {
+void describe_end(const DesignProgram& program, const NlpResult& solution, DesignResult& result) {
   const NlpPoint& end = solution.point;
   const Eigen::VectorXd rho_x = program.scaling().rho_x(solution.x);  // how large the optimiser takes the variables
   for (std::size_t k = 0; k < result.variables.size(); ++k) {
     DesignVariable& v = result.variables[k];
-    v.value = result.rho(evaluator.variables()[k]);
+    v.value = result.rho(program.evaluator().variables()[k]);
     const double width = v.lower && v.upper ? *v.upper - *v.lower : INFINITY;
     const double size = std::min(width, kWide * rho_x(static_cast<Eigen::Index>(k)));
     v.at_lower = touches(v.value, v.lower, size), v.at_upper = touches(v.value, v.upper, size);
@@ -202,8 +194,7 @@ void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, 
   }
 }
 
-void describe_solution(DesignProgram& program, const VariableScaling& scaling, const LimitedSolution& rounds,
-                       double tolerance, DesignResult& result) {
+void describe_solution(DesignProgram& program, const LimitedSolution& rounds, DesignResult& result) {
   const Eigen::VectorXd& x = rounds.solution.x;
   result.final_evaluation = program.evaluation(result.rho);
   describe_objective(program, rounds.true_values, result);
@@ -228,17 +219,16 @@ void describe_solution(DesignProgram& program, const VariableScaling& scaling, c
     const Eigen::Index row = static_cast<Eigen::Index>(i);
     const double fall =
         found.multipliers(row) * program.c_scale(row) / (program.f_scale * program.size(row) * rounds.slopes(row));
-    const bool equality = c.lower && c.upper && *c.lower == *c.upper, binds = found.binds(row, tolerance);
+    const bool equality = is_equality(c), binds = found.binds(row, program.spec().optimizer.tolerance);
     c.price = equality ? fall : binds ? std::abs(fall) : 0;
     c.at_lower = c.at_lower || (binds && fall < 0), c.at_upper = c.at_upper || (binds && fall > 0);
   }
-  if (result.status == SolverStatus::infeasible) describe_conflict(program, scaling, x, end, result);
+  if (result.status == SolverStatus::infeasible) describe_conflict(program, x, end, result);
 }
 
-void judge_solution(const DesignSpec& spec, const DesignProgram& program, const CaseEvaluator& evaluator,
-                    DesignResult& result) {
-  judge_stationarity(spec, result);
-  judge_true_extremes(program, evaluator, result);
+void judge_solution(const DesignProgram& program, DesignResult& result) {
+  judge_stationarity(program.spec().optimizer, result);
+  judge_true_extremes(program, result);
 }
 
 }  // namespace mbsopt::inline optim

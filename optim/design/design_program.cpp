@@ -1,11 +1,17 @@
 #include "optim/design/design_program.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
+#include "optim/objective/design_issues.hpp"
 #include "optim/objective/gauss_newton.hpp"
 #include "optim/objective/hessian.hpp"
+#include "optim/problem/bounded_means.hpp"
+#include "optim/solver/nlopt_solver.hpp"
 #include "optim/solver/nlp_search.hpp"
 
 namespace mbsopt::inline optim {
@@ -14,6 +20,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double inverse(double x) { return x > 0 && std::isfinite(x) ? 1 / x : 1; }
 
@@ -26,32 +34,132 @@ HessianOptions for_steps() {
   return options;
 }
 
+const DesignSpec& checked(const Problem& problem) {
+  if (!problem.design) throw std::invalid_argument("design: is missing; it says what to minimise and what to vary");
+  const DesignSpec& spec = *problem.design;
+  if (spec.variables.empty()) throw std::invalid_argument("design.variables: is empty; name at least one parameter");
+  const bool is_known = spec.optimizer.type == "ipopt" || spec.optimizer.type == OptimizerSpec::kLeastSquares ||
+                        find_nlopt_method(spec.optimizer.type);
+  if (!is_known)
+    throw std::invalid_argument(fmt::format("design.optimizer.type: is '{}'; available: ipopt {} {}",
+                                            spec.optimizer.type, OptimizerSpec::kLeastSquares, nlopt_method_names()));
+  for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
+    const ObjectiveBound& bound = spec.subject_to[i];
+    if (!bound.lower && !bound.upper)
+      throw std::invalid_argument(fmt::format("design.subject_to[{}]: gives neither lower nor upper", i));
+    if (bound.lower && bound.upper && *bound.lower > *bound.upper)
+      throw std::invalid_argument(
+          fmt::format("design.subject_to[{}]: lower is {}, above upper {}", i, *bound.lower, *bound.upper));
+  }
+  if (const std::vector<SceneIssue> issues = optimizer_issues(spec, problem.scene); !issues.empty())
+    throw std::invalid_argument(issues[0].path + ": " + issues[0].message);
+  if (const std::optional<SceneIssue> issue = curvature_issue(problem))
+    throw std::invalid_argument(issue->path + ": " + issue->message);
+  return spec;
+}
+
+Problem with_named_means(Problem problem) {
+  name_bounded_means(problem);
+  return problem;
+}
+
+EvaluatorOptions evaluator_options(const DesignOptions& options) {
+  EvaluatorOptions result;
+  result.method = options.method, result.user_forces = options.user_forces, result.threads = options.threads;
+  result.progress = options.simulation_progress;
+  return result;
+}
+
 }  // namespace
 
-DesignProgram::DesignProgram(const DesignSpec& spec, CaseEvaluator& evaluator, const VariableScaling& scaling,
-                             CaseObjective objective, std::function<bool()> abandoned)
-    : NonlinearProgram(scaling.size(), static_cast<Index>(spec.subject_to.size() * evaluator.cases())),
-      evaluator_(evaluator),
-      objective_(std::move(objective)),
-      bounds_(static_cast<Index>(spec.subject_to.size())),
-      scaling_(scaling),
+std::vector<std::string> objective_names(const DesignSpec& spec) {
+  std::vector<std::string> names{spec.minimize};
+  for (const ObjectiveBound& bound : spec.subject_to) names.push_back(bound.objective);
+  return names;
+}
+
+DesignProgram::DesignProgram(const Problem& problem, const DesignOptions& options, std::function<bool()> abandoned)
+    : NonlinearProgram(0, 0),
+      problem_(with_named_means(problem)),
+      spec_(checked(problem_)),
+      evaluator_(problem_, objective_names(spec_), spec_.variables, evaluator_options(options)),
+      scaling_(designed(), felt_changes()),
+      x_start_(scaling_.to_x(evaluator_.start()(evaluator_.variables()))),
+      bounds_(static_cast<Index>(spec_.subject_to.size())),
       abandoned_(std::move(abandoned)),
-      rho_(evaluator.start()),
-      size_(constraints()),
-      gauss_newton_(spec.optimizer.hessian == "gauss_newton") {
-  x_lower = scaling.x_lower(), x_upper = scaling.x_upper();
-  for (Index i = 0; i < constraints(); ++i) {
-    const ObjectiveBound& bound = spec.subject_to[static_cast<std::size_t>(i % bounds_)];
-    size_(i) = std::max(std::abs(bound.lower.value_or(0)), std::abs(bound.upper.value_or(0)));
-    if (size_(i) == 0) size_(i) = 1;
-    if (bound.lower) c_lower(i) = *bound.lower / size_(i);
-    if (bound.upper) c_upper(i) = *bound.upper / size_(i);
+      gauss_newton_(spec_.optimizer.hessian == "gauss_newton") {
+  x_lower = scaling_.x_lower(), x_upper = scaling_.x_upper();
+  if (!spec_.sharpness) spec_.sharpness = sharpness();
+  objective_ = CaseObjective(problem_.cases, spec_);
+  const Index m = bounds_ * static_cast<Index>(evaluator_.cases());
+  c_lower.setConstant(m, -kInfinity), c_upper.setConstant(m, kInfinity), c_scale.setOnes(m), size_.setOnes(m);
+  for (Index i = 0; i < m; ++i) {
+    const double size = std::max(std::abs(bound(i).lower.value_or(0)), std::abs(bound(i).upper.value_or(0)));
+    if (size > 0) size_(i) = size;
+    set_bounds(i, bound(i).lower, bound(i).upper);
   }
+}
+
+std::vector<Parameter> DesignProgram::designed() const {
+  std::vector<Parameter> parameters;
+  for (const int k : evaluator_.variables())
+    parameters.push_back(problem_.scene.parameters[static_cast<std::size_t>(k)]);
+  return parameters;
+}
+
+// Per variable the change d that alters an objective or a limit by its size:
+//   |g| d + |h| d^2/2 = |psi|      g: slope at the start, h: its change along a short step of all these variables
+// Empty if all values tell how large their variables are. Where h is not known, values tell that unless they are 0.
+VectorXd DesignProgram::felt_changes() {
+  constexpr double kShort = 1e-3, kShortOfRange = 1e-8;  // of the value; of a range, which may be far too wide
+  const std::vector<Parameter> variables = designed();
+  const std::vector<int>& indices = evaluator_.variables();
+  if (std::ranges::none_of(variables, is_scaled_by_range)) return {};
+  const Evaluation start = evaluator_.gradients(evaluator_.start());
+  if (!start.ok) return {};
+  VectorXd beside = evaluator_.start();
+  for (std::size_t k = 0; k < variables.size(); ++k) {
+    const Parameter& p = variables[k];
+    if (!is_scaled_by_range(p)) continue;
+    const double of_range = p.lower && p.upper ? kShortOfRange * (*p.upper - *p.lower) : kShort;
+    const double step = p.value != 0 ? kShort * std::abs(p.value) : of_range;
+    beside(indices[k]) += p.upper && p.value + step > *p.upper ? -step : step;
+  }
+  const Evaluation there = evaluator_.gradients(beside);
+  VectorXd felt(start.psi_rho.cols());
+  for (Index k = 0; k < felt.size(); ++k) {
+    const int index = indices[static_cast<std::size_t>(k)];
+    const double step = beside(index) - start.rho(index);
+    felt(k) = there.ok || start.rho(index) == 0 ? kInfinity : 0;
+    for (Index i = 0; i < start.psi.size(); ++i) {
+      const double size = std::abs(start.psi(i)), g = std::abs(start.psi_rho(i, k));
+      const double h = there.ok && step != 0 ? std::abs((there.psi_rho(i, k) - start.psi_rho(i, k)) / step) : 0;
+      if (size > 0 && g + h > 0) felt(k) = std::min(felt(k), 2 * size / (g + std::sqrt(g * g + 2 * h * size)));
+    }
+  }
+  return felt;
+}
+
+// The sharpness of the maximum over cases is relative to the largest value at the start.
+std::optional<double> DesignProgram::sharpness() {
+  if (spec_.over != "max" || problem_.cases.size() < 2) return std::nullopt;
+  const Evaluation start = evaluator_.gradients(evaluator_.start());
+  double largest = 0;
+  for (std::size_t c = 0; c < problem_.cases.size() && start.ok; ++c)
+    largest = std::max(largest, std::abs(problem_.cases[c].weight * start.of_cases[c].psi(0)));
+  return DesignSpec::kSharpness / (largest > 0 ? largest : 1);
 }
 
 Index DesignProgram::row_of(std::size_t load_case) const { return static_cast<Index>(load_case) * (1 + bounds_); }
 Index DesignProgram::psi_of(Index constraint) const {
   return row_of(static_cast<std::size_t>(constraint / bounds_)) + 1 + constraint % bounds_;
+}
+const Objective& DesignProgram::limited(Index constraint) const {
+  return evaluator_.of_case(static_cast<std::size_t>(constraint / bounds_))
+      .objectives()[static_cast<std::size_t>(1 + constraint % bounds_)];
+}
+const ObjectiveBound& DesignProgram::bound(Index constraint) const {
+  return spec_.subject_to[static_cast<std::size_t>(constraint % bounds_)];
 }
 
 VectorXd DesignProgram::minimised(const VectorXd& psi) const { return psi(Eigen::seq(0, psi.size() - 1, 1 + bounds_)); }
@@ -83,10 +191,10 @@ NlpScale DesignProgram::scale_at(const VectorXd& x_start) {
   return {inverse(f_size), c_size.unaryExpr([](double size) { return std::min(1.0, inverse(size)); })};
 }
 
-CaseEvaluation DesignProgram::start_from(const VectorXd& x_start, const std::optional<NlpScale>& given) {
+Evaluation DesignProgram::start_from(const VectorXd& x_start, const std::optional<NlpScale>& given) {
   const NlpScale scale = given ? *given : scale_at(x_start);
   f_scale = scale.f, c_scale = scale.c;
-  const CaseEvaluation start = evaluator_.gradients(rho_at(x_start));  // in memory, unless the scale is given
+  const Evaluation start = evaluator_.gradients(rho_at(x_start));  // in memory, unless the scale is given
   if (start.ok)
     best_ = start, best_f_ = objective_.value(minimised(start.psi)), best_violations_ = violations_of(start);
   return start;
@@ -94,9 +202,8 @@ CaseEvaluation DesignProgram::start_from(const VectorXd& x_start, const std::opt
 
 void DesignProgram::set_bounds(Index constraint, const std::optional<double>& lower,
                                const std::optional<double>& upper) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
-  c_lower(constraint) = lower.value_or(-kNone) / size_(constraint);
-  c_upper(constraint) = upper.value_or(kNone) / size_(constraint);
+  c_lower(constraint) = lower.value_or(-kInfinity) / size_(constraint);
+  c_upper(constraint) = upper.value_or(kInfinity) / size_(constraint);
   if (best_.ok) best_violations_ = violations_of(best_);
 }
 
@@ -107,14 +214,13 @@ double DesignProgram::violations_of(const Evaluation& e) const {
 }
 
 VectorXd DesignProgram::rho_at(const VectorXd& x) const {
-  VectorXd rho = rho_;
-  const VectorXd values = scaling_.to_rho(x);
-  for (Index k = 0; k < values.size(); ++k) rho(evaluator_.variables()[static_cast<std::size_t>(k)]) = values(k);
+  VectorXd rho = evaluator_.start();  // which parameters that are not designed keep
+  rho(evaluator_.variables()) = scaling_.to_rho(x);
   return rho;
 }
 
-// Into the point: values, and derivatives where it has room for them.
-void DesignProgram::fill(const CaseEvaluation& e, const VectorXd& x, NlpPoint& point) const {
+// Into the point: values, and derivatives where it has room for them. Keeps the evaluation if it is the best.
+void DesignProgram::fill(const Evaluation& e, const VectorXd& x, NlpPoint& point) {
   if (!e.ok) {
     point.ok = false, point.message = e.message;
     point.abandoned = abandoned_ && abandoned_();
@@ -122,73 +228,51 @@ void DesignProgram::fill(const CaseEvaluation& e, const VectorXd& x, NlpPoint& p
   }
   point.f = objective_.value(minimised(e.psi));
   for (Index i = 0; i < constraints(); ++i) point.c(i) = e.psi(psi_of(i)) / size_(i);
-  if (point.f_x.size() == 0) return;
-  const VectorXd rho_x = scaling_.rho_x(x);
-  point.f_x = f_rho(e).cwiseProduct(rho_x);
-  for (Index i = 0; i < constraints(); ++i)
-    point.c_x.row(i) = e.psi_rho.row(psi_of(i)).cwiseProduct(rho_x.transpose()) / size_(i);
+  if (point.f_x.size() > 0) {
+    const VectorXd rho_x = scaling_.rho_x(x);
+    point.f_x = f_rho(e).cwiseProduct(rho_x);
+    for (Index i = 0; i < constraints(); ++i)
+      point.c_x.row(i) = e.psi_rho.row(psi_of(i)).cwiseProduct(rho_x.transpose()) / size_(i);
+  }
+  const double violations = violations_of(e);
+  if (best_.ok && !is_better(point.f, violations, best_f_, best_violations_)) return;
+  best_ = e, best_f_ = point.f, best_violations_ = violations;
 }
 
-void DesignProgram::keep(const CaseEvaluation& e) {
-  if (!e.ok || &e == &best_) return;
-  const double f = objective_.value(minimised(e.psi)), now = violations_of(e);
-  if (best_.ok && !is_better(f, now, best_f_, best_violations_)) return;
-  best_ = e, best_f_ = f, best_violations_ = now;
-}
-
-void DesignProgram::evaluate(const VectorXd& x, NlpPoint& point) {
-  const CaseEvaluation& e = evaluation(rho_at(x));
-  fill(e, x, point);
-  keep(e);
-}
+void DesignProgram::evaluate(const VectorXd& x, NlpPoint& point) { fill(evaluation(rho_at(x)), x, point); }
 
 void DesignProgram::evaluate_values(const VectorXd& x, NlpPoint& point) {
   const VectorXd rho = rho_at(x);
-  const CaseEvaluation& e = best_.ok && best_.rho == rho ? best_ : evaluator_.values(rho);
-  fill(e, x, point);
-  keep(e);
+  fill(best_.ok && best_.rho == rho ? best_ : evaluator_.values(rho), x, point);
 }
 
-CaseEvaluation DesignProgram::evaluation(const VectorXd& rho) {
+Evaluation DesignProgram::evaluation(const VectorXd& rho) {
   return best_.ok && best_.has_gradients() && best_.rho == rho ? best_ : evaluator_.gradients(rho);
 }
 
 // Hessians of the evaluator's objectives, case by case, exact or by Gauss-Newton.
-bool DesignProgram::second_derivatives(const VectorXd& rho, std::vector<MatrixXd>& psi_rhorho) {
-  struct Found {
-    bool ok = false;
-    std::string message;
-    std::vector<MatrixXd> of;
-    long gradients = 1;
-  };
-  std::vector<Found> found(evaluator_.cases());
-  const CaseEvaluation at = evaluation(rho);
+bool DesignProgram::second_derivatives(const Evaluation& at, std::vector<MatrixXd>& psi_rhorho) {
+  std::vector<Hessians> found(evaluator_.cases());
   evaluator_.for_each_case([&](std::size_t c) {
-    if (gauss_newton_) {
-      const Evaluation& e = at.of_cases[c];
-      GaussNewton H = e.ok ? gauss_newton(evaluator_.of_case(c), e) : GaussNewton{false, e.message, {}};
-      found[c] = {H.ok, H.message, std::move(H.of)};
-      return;
-    }
-    const Hessians H = mbsopt::hessians(evaluator_.of_case(c), rho, for_steps());
-    found[c] = {H.ok, H.message, {}, H.gradients};
-    for (const ObjectiveHessian& of : H.of) found[c].of.push_back(of.value);
+    Evaluator& evaluator = evaluator_.of_case(c);
+    found[c] =
+        gauss_newton_ ? gauss_newton(evaluator, at.of_case(c)) : mbsopt::hessians(evaluator, at.rho, for_steps());
   });
   bool ok = true;
-  for (Found& of_case : found) {
+  for (Hessians& of_case : found) {
     if (!of_case.ok && hessian_failure_.empty()) hessian_failure_ = of_case.message;
     ok = ok && of_case.ok;
     hessian_gradients_ += of_case.gradients;
-    for (MatrixXd& H : of_case.of) psi_rhorho.push_back(std::move(H));
+    for (ObjectiveHessian& H : of_case.of) psi_rhorho.push_back(std::move(H.value));
   }
   return ok;
 }
 
 bool DesignProgram::hessians(const VectorXd& x, std::vector<MatrixXd>& H) {
-  const VectorXd rho_x = scaling_.rho_x(x), rho_xx = scaling_.rho_xx(x), rho = rho_at(x);
+  const VectorXd rho_x = scaling_.rho_x(x), rho_xx = scaling_.rho_xx(x);
+  const Evaluation at = evaluation(rho_at(x));
   std::vector<MatrixXd> psi_rhorho;
-  if (!second_derivatives(rho, psi_rhorho)) return false;
-  const CaseEvaluation at = evaluation(rho);  // of Gauss-Newton rho(x) is a part of the motion
+  if (!second_derivatives(at, psi_rhorho)) return false;
   const auto of_psi = [&](Index row) -> MatrixXd& { return psi_rhorho[static_cast<std::size_t>(row)]; };
   const auto in_x = [&](const MatrixXd& of_rho, const VectorXd& gradient) {
     MatrixXd of_x = rho_x.asDiagonal() * of_rho * rho_x.asDiagonal();

@@ -1,13 +1,15 @@
-// The result of a design: variables, limits and load cases at the solution, and the history.
+// The options of a design, and its result: variables, limits and load cases at the solution, and the history.
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "optim/objective/case_evaluator.hpp"
+#include "optim/objective/evaluator.hpp"
 #include "optim/solver/nonlinear_program.hpp"
 
 namespace mbsopt::inline optim {
@@ -64,9 +66,8 @@ struct DesignRow {
   long simulations = 0;        // so far; those of least_squares are counted at its end
 };
 
-struct DesignResult {
-  SolverStatus status = SolverStatus::failed;
-  std::string message;  // in words, always
+// x: the scaled variables at the solution.
+struct DesignResult : SolverOutcome {
   std::string objective;
   double objective_initial = 0, objective_final = 0;
   std::optional<double> objective_true;  // at the solution, where it is a smooth extreme, or a smooth maximum of cases
@@ -75,10 +76,10 @@ struct DesignResult {
   std::vector<DesignCase> cases;              // where the problem has some
   std::vector<DesignConflict> conflicts;      // where the limits cannot all hold
   std::vector<DesignRow> history;
-  Eigen::VectorXd rho;              // all parameters at the solution, or at the best point where there is none
-  CaseEvaluation final_evaluation;  // there, unless stopped: per case what is minimised, then what is bounded
-  std::string optimizer;            // as in the problem: "ipopt"
-  std::string algorithm;            // in the words of its library
+  Eigen::VectorXd rho;          // all parameters at the solution, or at the best point where there is none
+  Evaluation final_evaluation;  // there, unless stopped: per case what is minimised, then what is bounded
+  std::string optimizer;        // as in the problem: "ipopt"
+  std::string algorithm;        // in the words of its library
   double optimality = std::numeric_limits<double>::quiet_NaN();  // at the solution, by the yardstick of all:
                                                                  // optimality.hpp; NaN where stopped
   double violation = 0;         // at the solution: largest of the constraints, each relative to its bounds
@@ -87,9 +88,7 @@ struct DesignResult {
   NlpScale scale;               // by which convergence was judged
   std::string gradient_choice;  // method and why
   int limit_rounds = 0;         // in which bounds of smooth extremes were moved so that the true ones keep their limits
-  int iterations = 0;
-  long evaluations = 0, failed_evaluations = 0;  // points at which objectives and gradients were computed
-  long simulations = 0;                          // also those of second derivatives
+  long simulations = 0;         // also those of second derivatives
   double wall_seconds = 0;
   std::vector<std::string> warnings;  // sentences
   std::optional<DesignMode> mode;     // where one was asked for
@@ -99,6 +98,22 @@ struct DesignResult {
     return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||
            status == SolverStatus::no_progress || status == SolverStatus::searched;
   }
+};
+
+// What the problem does not give.
+struct DesignOptions {
+  GradientMethod method = GradientMethod::automatic;
+  std::vector<std::shared_ptr<const UserForce>> user_forces;
+  int threads = 1;                                    // that compute load cases
+  std::function<bool(const DesignRow&)> progress;     // after every iteration; false stops, the best so far is kept
+  std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+  bool evaluate_stopped = true;                       // the end point of an abandoned search: a last evaluation
+  PointRecords* records = nullptr;                    // of an earlier run that this one goes on with
+  bool compare_differences = true;                    // at the start, difference_comparison.hpp; in the warnings
+  // The scale that judges convergence; if absent, about 1 over the objective and its gradient at the start. Runs from
+  // several starts share one, so that "converged" means the same of all.
+  std::optional<NlpScale> scale = {};
+  std::optional<int> mode = {};  // assembly mode at the start (DesignMode); none: that of the scene's poses
 };
 
 }  // namespace mbsopt::inline optim

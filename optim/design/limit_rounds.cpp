@@ -55,10 +55,10 @@ NlpResult solved_with_nlopt(DesignProgram& program, const Eigen::VectorXd& x_sta
   return solve_with_nlopt(program, x_start, solver);
 }
 
-NlpResult solved_once(DesignProgram& program, const CaseEvaluator& evaluator, const Eigen::VectorXd& x_start,
-                      const OptimizerSpec& spec, const SearchHooks& hooks, DesignResult& result) {
+NlpResult solved_once(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
+                      const SearchHooks& hooks, DesignResult& result) {
   if (spec.type == OptimizerSpec::kLeastSquares)
-    return solve_tracked_squares(program, evaluator, x_start, spec, hooks.progress, hooks.records, result.simulations);
+    return solve_tracked_squares(program, x_start, spec, hooks.progress, hooks.records, result.simulations);
   if (spec.type == "ipopt") return solved_with_ipopt(program, x_start, spec, hooks);
   return solved_with_nlopt(program, x_start, spec, hooks, result.seed);
 }
@@ -102,17 +102,16 @@ SearchHooks continued(const SearchHooks& hooks, int iterations) {
 
 // Solves again within the moved bounds, from the last solution. If the method stalls there, it solves from the first
 // start.
-void solve_again(const DesignSpec& spec, DesignProgram& program, const CaseEvaluator& evaluator,
-                 const Eigen::VectorXd& x_start, const SearchHooks& hooks, NlpResult& solution, DesignResult& result) {
+void solve_again(DesignProgram& program, const SearchHooks& hooks, NlpResult& solution, DesignResult& result) {
   for (const bool from_solution : {true, false}) {
-    OptimizerSpec rest = remaining(spec.optimizer, solution);
+    OptimizerSpec rest = remaining(program.spec().optimizer, solution);
     if (!may_go_on(rest)) {
       return solution.end(
           SolverStatus::iteration_limit,
           "stopped at the limit of iterations or evaluations, before the limits held for true extremes");
     }
     rest.warm_start = from_solution || rest.warm_start;
-    NlpResult found = solved_once(program, evaluator, from_solution ? solution.x : x_start, rest,
+    NlpResult found = solved_once(program, from_solution ? solution.x : program.x_start(), rest,
                                   continued(hooks, solution.iterations), result);
     const bool is_worse = !from_solution && !is_an_improvement(program, found, solution);
     found.iterations += solution.iterations, found.evaluations += solution.evaluations;
@@ -140,20 +139,19 @@ Eigen::VectorXi binding_sides(const OptimizerSpec& spec, const DesignProgram& pr
 
 }  // namespace
 
-LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, CaseEvaluator& evaluator,
-                                const Eigen::VectorXd& x_start, const SearchHooks& hooks, DesignResult& result) {
-  TrueLimits limits(spec, evaluator);
+LimitedSolution solve_in_rounds(DesignProgram& program, const SearchHooks& hooks, DesignResult& result) {
+  const OptimizerSpec& optimizer = program.spec().optimizer;
+  TrueLimits limits(program);
   LimitedSolution rounds;
   NlpResult& solution = rounds.solution;
-  solution = solved_once(program, evaluator, x_start, spec.optimizer, hooks, result);
+  solution = solved_once(program, program.x_start(), optimizer, hooks, result);
   while (solution.point.ok && !hooks.abandoned()) {
-    rounds.true_values = evaluator.true_values(program.rho_at(solution.x));
+    rounds.true_values = program.evaluator().true_values(program.rho_at(solution.x));
     if (!is_an_end(solution.status)) break;
     const TrueLimits limits_before = limits;
-    if (!limits.move(program, solution.point.c, rounds.true_values, binding_sides(spec.optimizer, program, solution)))
-      break;
+    if (!limits.move(program, solution.point.c, rounds.true_values, binding_sides(optimizer, program, solution))) break;
     NlpResult before = solution;
-    solve_again(spec, program, evaluator, x_start, hooks, solution, result);
+    solve_again(program, hooks, solution, result);
     const bool as_good = solution.status == SolverStatus::converged || solution.status == before.status;
     if (as_good || !limits_before.hold(program, rounds.true_values)) continue;
     before.take_counts(solution);  // the limits held there

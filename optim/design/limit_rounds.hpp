@@ -1,7 +1,7 @@
 // Solves a design by its optimiser, in rounds. After each round the bounds of smooth extremes move (true_limits.hpp),
 // until the true extremes keep their limits.
 //
-//   const LimitedSolution rounds = solve_in_rounds(spec, program, evaluator, x_start, hooks, result);
+//   const LimitedSolution rounds = solve_in_rounds(program, hooks, result);
 #pragma once
 
 #include <Eigen/Core>
@@ -10,9 +10,6 @@
 #include <vector>
 
 #include "optim/design/design_program.hpp"
-#include "optim/design/design_result.hpp"
-#include "optim/objective/case_evaluator.hpp"
-#include "optim/problem/problem.hpp"
 #include "optim/solver/nlp_search.hpp"
 
 namespace mbsopt::inline optim {
@@ -31,7 +28,6 @@ struct SearchHooks {
 };
 
 // Adds the seed, the rounds and the simulations to the result.
-LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, CaseEvaluator& evaluator,
-                                const Eigen::VectorXd& x_start, const SearchHooks& hooks, DesignResult& result);
+LimitedSolution solve_in_rounds(DesignProgram& program, const SearchHooks& hooks, DesignResult& result);
 
 }  // namespace mbsopt::inline optim

@@ -1,4 +1,4 @@
-#include "optim/design/mode_design.hpp"
+#include "optim/design/design_search.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,6 @@
 #include "core/expression/counted.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/start/assembly.hpp"
-#include "optim/design/single_design.hpp"
 #include "optim/problem/parameter_values.hpp"
 
 namespace mbsopt::inline optim {
@@ -37,12 +36,6 @@ void begin_with(const DesignResult& earlier, DesignResult& result) {
   for (std::size_t c = 0; c < result.constraints.size(); ++c)
     result.constraints[c].initial = earlier.constraints[c].initial;
   for (std::size_t c = 0; c < result.cases.size(); ++c) result.cases[c].initial = earlier.cases[c].initial;
-}
-
-void take_counts(const DesignResult& of, DesignResult& result) {
-  result.iterations = of.iterations, result.evaluations = of.evaluations;
-  result.failed_evaluations = of.failed_evaluations;
-  result.simulations = of.simulations, result.wall_seconds = of.wall_seconds;
 }
 
 std::vector<DesignRow> joined_histories(std::vector<DesignRow> first, std::vector<DesignRow> second) {
@@ -86,8 +79,9 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
                            more.objective_final < result.objective_final;
     begin_with(result, more);
     if (!is_better) {
-      take_counts(more, result);
-      if (more.status == SolverStatus::stopped) result.status = more.status, result.message = more.message;
+      result.take_counts(more);
+      result.simulations = more.simulations, result.wall_seconds = more.wall_seconds;
+      if (more.status == SolverStatus::stopped) result.end(more.status, more.message);
       break;
     }
     more.history = joined_histories(std::move(result.history), std::move(more.history));
@@ -126,7 +120,7 @@ DesignResult design_in_mode(const Problem& given, const DesignOptions& options) 
   const auto [modes, abandoned] = modes_at(given.scene, options);
   if (abandoned) {
     DesignResult none = not_begun(given);
-    none.status = SolverStatus::stopped, none.message = "stopped on request";
+    none.end_on_request();
     return none;
   }
   if (mode >= static_cast<int>(modes.size())) {

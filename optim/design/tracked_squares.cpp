@@ -24,11 +24,11 @@ constexpr Index kMostNumbers = 50'000;
 constexpr const char* kNoValue =
     "a residual or its derivative is not a number: a tracked weight is negative, or a sensor has no value";
 
-const Objective& minimised(const CaseEvaluator& evaluator, std::size_t load_case) {
+const Objective& minimised(const Evaluator& evaluator, std::size_t load_case) {
   return evaluator.of_case(load_case).objectives()[0];
 }
 
-Index residuals(const CaseEvaluator& evaluator) {
+Index residuals(const Evaluator& evaluator) {
   std::size_t count = 0;
   for (std::size_t c = 0; c < evaluator.cases(); ++c) count += minimised(evaluator, c).residuals().size();
   return static_cast<Index>(count);
@@ -55,10 +55,10 @@ void project_free_instants(const Objective& objective, const std::vector<Objecti
 
 }  // namespace
 
-TrackedSquares::TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator, PointRecords* records)
-    : LeastSquaresProblem(program.variables(), mbsopt::residuals(evaluator) + program.constraints()),
+TrackedSquares::TrackedSquares(const DesignProgram& program, PointRecords* records)
+    : LeastSquaresProblem(program.variables(), mbsopt::residuals(program.evaluator()) + program.constraints()),
       program_(program),
-      evaluator_(evaluator),
+      evaluator_(program.evaluator()),
       records_(size * (1 + variables()) <= kMostNumbers ? records : nullptr),
       residuals_(size - program.constraints()) {
   x_lower = program.x_lower, x_upper = program.x_upper;
@@ -113,10 +113,9 @@ std::vector<TrackedSquares::Taken> TrackedSquares::taken_in(std::size_t c,
   for (std::size_t i = 0; i < rows.size(); ++i)
     taken.push_back({instants[i].time, &rows[i].value, first + static_cast<Index>(i), weight});
   const Index limits = program_.constraints() / static_cast<Index>(evaluator_.cases());
-  for (Index i = 0; i < limits; ++i) {
-    const Index constraint = static_cast<Index>(c) * limits + i;
-    const Objective& limited = evaluator_.of_case(c).objectives()[static_cast<std::size_t>(1 + i)];
-    for (const Objective::Sample& sample : limited.samples())
+  for (Index constraint = static_cast<Index>(c) * limits; constraint < static_cast<Index>(c + 1) * limits;
+       ++constraint) {
+    for (const Objective::Sample& sample : program_.limited(constraint).samples())
       taken.push_back({sample.time, &sample.value, residuals_ + constraint, 1 / program_.size(constraint)});
   }
   std::ranges::stable_sort(taken, {}, &Taken::time);
@@ -124,9 +123,8 @@ std::vector<TrackedSquares::Taken> TrackedSquares::taken_in(std::size_t c,
 }
 
 void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
-  const auto go_on = [&](double t) {
-    abandoned_ =
-        abandoned_ || (evaluator_.of_case(0).options().progress && !evaluator_.of_case(0).options().progress(t));
+  const auto go_on = [&, &progress = evaluator_.options().progress](double t) {
+    abandoned_ = abandoned_ || (progress && !progress(t));
     return !abandoned_;
   };
   const VectorXd rho = program_.rho_at(x), rho_x = program_.scaling().rho_x(x);
@@ -136,9 +134,7 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     const Evaluator& evaluator = evaluator_.of_case(c);
     const Objective& objective = minimised(evaluator_, c);
     const std::vector<Objective::Sample>& rows = objective.residuals();
-    std::vector<bool> active(evaluator.scene().parameters.size(), false);
-    for (const int k : evaluator.variables()) active[static_cast<std::size_t>(k)] = true;
-    const Mechanism mechanism(evaluator.scene(), rho, active, evaluator.options().user_forces, evaluator.programs());
+    const Mechanism mechanism = evaluator.mechanism(rho, true);
     const std::vector<Objective::Instant> instants = objective.instants_of(rows, mechanism, go_on);
     const std::vector<Taken> taken = taken_in(c, instants, first, std::sqrt(weights(static_cast<Index>(c))));
     std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
@@ -179,10 +175,10 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
   }
 }
 
-NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& evaluator, const VectorXd& x_start,
-                                const OptimizerSpec& spec, const std::function<bool(const NlpProgress&)>& progress,
-                                PointRecords* records, long& simulations) {
-  TrackedSquares problem(program, evaluator, records);
+NlpResult solve_tracked_squares(DesignProgram& program, const VectorXd& x_start, const OptimizerSpec& spec,
+                                const std::function<bool(const NlpProgress&)>& progress, PointRecords* records,
+                                long& simulations) {
+  TrackedSquares problem(program, records);
   LeastSquaresOptions options;
   options.tolerance *= spec.tolerance / OptimizerSpec{}.tolerance;  // the default of one is that of the other
   if (spec.max_iterations) options.max_iterations = static_cast<int>(*spec.max_iterations);

@@ -18,7 +18,7 @@ class TrackedSquares : public LeastSquaresProblem {
  public:
   // records: may be null. A point is recorded as one of constraints c = z, c_x = z_x, but not where the run is solved:
   // that costs less than its record. Rows: residuals, then limits.
-  TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator, PointRecords* records = nullptr);
+  explicit TrackedSquares(const DesignProgram& program, PointRecords* records = nullptr);
 
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
   Eigen::Index residuals() const { return residuals_; }
@@ -41,7 +41,7 @@ class TrackedSquares : public LeastSquaresProblem {
                                  const TangentSampling& sampling, const RunOptions& options);
 
   const DesignProgram& program_;
-  const CaseEvaluator& evaluator_;
+  const Evaluator& evaluator_;  // of the program
   PointRecords* const records_;
   const Eigen::Index residuals_;
   long simulations_ = 0;
@@ -52,8 +52,8 @@ class TrackedSquares : public LeastSquaresProblem {
 };
 
 // simulations: is added to.
-NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& evaluator, const Eigen::VectorXd& x_start,
-                                const OptimizerSpec& spec, const std::function<bool(const NlpProgress&)>& progress,
-                                PointRecords* records, long& simulations);
+NlpResult solve_tracked_squares(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
+                                const std::function<bool(const NlpProgress&)>& progress, PointRecords* records,
+                                long& simulations);
 
 }  // namespace mbsopt::inline optim

@@ -19,12 +19,11 @@ constexpr double kNoChange = 1e-4;
 
 }  // namespace
 
-TrueLimits::TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator) {
-  const std::size_t bounds = spec.subject_to.size();
-  for (std::size_t i = 0; i < bounds * evaluator.cases(); ++i) {
-    if (!evaluator.of_case(i / bounds).objectives()[i % bounds + 1].is_extreme()) continue;
-    const ObjectiveBound& bound = spec.subject_to[i % bounds];
-    limits_.push_back({static_cast<Eigen::Index>(i), bound.lower, bound.upper, 1, bound.lower, bound.upper});
+TrueLimits::TrueLimits(const DesignProgram& program) {
+  for (Eigen::Index i = 0; i < program.constraints(); ++i) {
+    const ObjectiveBound& bound = program.bound(i);
+    if (program.limited(i).is_extreme())
+      limits_.push_back({i, bound.lower, bound.upper, program.size(i), bound.lower, bound.upper});
   }
 }
 
@@ -65,7 +64,6 @@ bool TrueLimits::move(DesignProgram& program, const Eigen::VectorXd& c,
   for (Limit& l : limits_) {
     const std::optional<double>& X = true_values[static_cast<std::size_t>(program.psi_of(l.constraint))];
     if (!X) continue;
-    l.size = program.size(l.constraint);
     const double value = c(l.constraint) * l.size;
     const int side = all_kept && !is_equality(l) ? sides(l.constraint) : 0;
     const bool released = l.held * sides(l.constraint) < 0;

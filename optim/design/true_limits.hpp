@@ -8,7 +8,7 @@
 // the multiplier says that the limit binds, and all limits hold, further rounds hold psi = b. If the multiplier changes
 // its sign there, the limit does not bind, and its bound is an inequality again. Each case has its own limits.
 //
-//   TrueLimits limits(spec, evaluator);
+//   TrueLimits limits(program);
 //   do solve(program); while (limits.move(program, psi, evaluator.true_values(rho), sides));
 #pragma once
 
@@ -17,8 +17,6 @@
 #include <vector>
 
 #include "optim/design/design_program.hpp"
-#include "optim/objective/case_evaluator.hpp"
-#include "optim/problem/problem.hpp"
 
 namespace mbsopt::inline optim {
 
@@ -27,8 +25,7 @@ inline constexpr double kTrueLimitTolerance = 1e-6;
 
 class TrueLimits {
  public:
-  // The evaluator's objectives: the one that is minimised, then those that are bounded.
-  TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator);
+  explicit TrueLimits(const DesignProgram& program);
 
   // Gives the program new bounds, and returns true, if true values break limits at the solution, or leave them unused.
   // Returns false if there is nothing to move, or if bounds were moved often enough. c: the program's constraints at

@@ -38,9 +38,8 @@ class Comparison {
   std::vector<std::string> sentences(std::size_t variable);
 
  private:
-  // Returns nullopt if f cannot be evaluated beside the start.
-  std::optional<Difference> difference(std::size_t variable) const;
-  std::optional<Difference> difference(std::size_t variable, double wanted) const;
+  // step: of the variable's size. Returns nullopt if f cannot be evaluated beside the start.
+  std::optional<Difference> difference(std::size_t variable, double step) const;
   // Returns the groups whose derivatives disagree with it, with a shorter one, and by more than the integrator's error.
   std::vector<const ComparedGroup*> disagreeing(std::size_t variable, const Difference& d);
   double largest_derivative(const ComparedGroup& group) const;
@@ -52,14 +51,9 @@ class Comparison {
   VectorXd errors_;  // of f
 };
 
-std::optional<Difference> Comparison::difference(std::size_t variable) const {
-  const double wanted = kStep * of_.variables[variable].size;
-  const std::optional<Difference> d = difference(variable, wanted);
-  return d ? d : difference(variable, wanted / kShorter);
-}
-
-std::optional<Difference> Comparison::difference(std::size_t variable, double wanted) const {
+std::optional<Difference> Comparison::difference(std::size_t variable, double step) const {
   const ComparedVariable& v = of_.variables[variable];
+  const double wanted = step * v.size;
   const double nearer = std::min(v.below, v.above), farther = std::max(v.below, v.above);
   Difference d;
   if (nearer >= wanted / kShorter) {
@@ -100,9 +94,8 @@ bool Comparison::disagrees(const ComparedGroup& group, std::size_t variable, con
 const VectorXd& Comparison::integrator_errors() {
   std::call_once(asked_, [&] {
     errors_.setZero(of_.f.size());
-    VectorXd f;
-    Eigen::MatrixXd f_rho;
-    if (of_.tighter && of_.tighter(f, f_rho) && f.size() == of_.f.size()) errors_ = (f - of_.f).cwiseAbs();
+    const std::optional<VectorXd> f = of_.tighter ? of_.tighter() : std::nullopt;
+    if (f && f->size() == of_.f.size()) errors_ = (*f - of_.f).cwiseAbs();
   });
   return errors_;
 }
@@ -112,7 +105,7 @@ std::vector<const ComparedGroup*> Comparison::disagreeing(std::size_t variable, 
   std::optional<Difference> shorter;
   for (const ComparedGroup& group : of_.groups) {
     if (!disagrees(group, variable, d, nullptr)) continue;
-    if (!shorter) shorter = difference(variable, kStep / kShorter * of_.variables[variable].size);
+    if (!shorter) shorter = difference(variable, kStep / kShorter);
     if (!shorter || !disagrees(group, variable, *shorter, nullptr)) continue;
     if (disagrees(group, variable, d, &integrator_errors())) found.push_back(&group);
   }
@@ -134,7 +127,8 @@ std::vector<std::string> Comparison::sentences(std::size_t variable) {
   const auto abandoned = [this] { return of_.go_on && !of_.go_on(); };
   const ComparedVariable& v = of_.variables[variable];
   if (abandoned() || !(std::max(v.below, v.above) > 0)) return {};  // its bounds leave it where it is
-  const std::optional<Difference> d = difference(variable);
+  std::optional<Difference> d = difference(variable, kStep);
+  if (!d) d = difference(variable, kStep / kShorter);
   if (abandoned()) return {};
   if (!d)
     return {fmt::format(

@@ -39,8 +39,8 @@ struct DifferenceComparison {
   Eigen::MatrixXd f_rho;  // and its derivatives
   // Returns f with one variable changed, or nullopt if it cannot be evaluated.
   std::function<std::optional<Eigen::VectorXd>(std::size_t variable, double h)> at;
-  // Sets f and its derivatives with ten times tighter tolerances; the change is the integrator's error. false: unknown.
-  std::function<bool(Eigen::VectorXd& f, Eigen::MatrixXd& f_rho)> tighter;
+  // Returns f with ten times tighter tolerances; the change is the integrator's error. Or nullopt if it is unknown.
+  std::function<std::optional<Eigen::VectorXd>()> tighter;
   std::function<bool()> go_on = {};  // false: abandon the comparison
   // The number of threads that call `at`, `tighter` and `go_on`. Above 1 these functions must be thread-safe.
   int threads = 1;

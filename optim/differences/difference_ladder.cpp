@@ -57,6 +57,14 @@ LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, do
 
 }  // namespace
 
+void LadderDerivative::take_better(const LadderDerivative& other) {
+  for (Eigen::Index i = 0; i < error.size(); ++i) {
+    if (!(other.error(i) < error(i))) continue;
+    derivative(i) = other.derivative(i), error(i) = other.error(i), rounding(i) = other.rounding(i);
+    step(i) = other.step(i), largest(i) = other.largest(i);
+  }
+}
+
 LadderDerivative difference_ladder(const LadderFunction& f, Eigen::Index size, const LadderOptions& options) {
   const auto rung_at = [&](double h) -> std::optional<Rung> {
     const std::optional<Eigen::VectorXd> plus = f(h), minus = f(-h);

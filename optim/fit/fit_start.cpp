@@ -73,12 +73,12 @@ FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data,
     if (!moved(stack, u, static_cast<Index>(k), h, limits, z)) return std::nullopt;
     return z;
   };
-  comparison.tighter = [&](Eigen::VectorXd& z, Eigen::MatrixXd&) {
+  comparison.tighter = [&]() -> std::optional<Eigen::VectorXd> {
     const std::optional<Scene> tight = with_other_tolerances(problem.scene);
-    if (!tight) return false;
+    if (!tight) return std::nullopt;
     const LeastSquaresPoint there = fitted_stack({*tight, spec, data, options, limits.progress}).at(x);
-    z = there.z.head(stack.samples());
-    return there.ok;
+    if (!there.ok) return std::nullopt;
+    return there.z.head(stack.samples());
   };
   const std::vector<std::string> differences = comparison.warnings();
   said.insert(said.end(), differences.begin(), differences.end());

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
+#include <numeric>
 #include <stdexcept>
 #include <unordered_map>
 #include <unordered_set>
@@ -14,29 +16,19 @@
 #include "core/mechanism/scene_programs.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "optim/differences/difference_ladder.hpp"
+#include "optim/machine/on_threads.hpp"
 #include "optim/machine/stopwatch.hpp"
 #include "optim/objective/objective_run.hpp"
 #include "optim/objective/obstructed_parameters.hpp"
+#include "optim/problem/load_cases.hpp"
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt::inline optim {
+
 std::string_view to_string(GradientMethod method) {
-  switch (method) {
-    case GradientMethod::tlm:
-      return "tlm";
-    case GradientMethod::adjoint:
-      return "adjoint";
-    case GradientMethod::cvodes_forward:
-      return "cvodes_forward";
-    case GradientMethod::cvodes_adjoint:
-      return "cvodes_adjoint";
-    case GradientMethod::differences:
-      return "fd";
-    case GradientMethod::automatic:
-      break;
-  }
-  return "auto";
+  constexpr std::string_view kNames[] = {"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"};
+  return kNames[static_cast<std::size_t>(method)];
 }
 
 GradientCost gradient_cost(std::size_t variables, std::size_t objectives) {
@@ -49,13 +41,127 @@ Evaluator::Evaluator(Scene scene, std::vector<Objective> objectives, const std::
     : scene_(std::move(scene)),
       objectives_(std::move(objectives)),
       variables_(parameter_indices(scene_, variables)),
-      active_(scene_.parameters.size(), false),
       options_(std::move(options)),
-      programs_(std::make_shared<ScenePrograms>(scene_)) {
-  for (const int k : variables_) active_[static_cast<std::size_t>(k)] = true;
-  for (std::size_t i = 0; i < objectives_.size(); ++i)
-    if (objectives_[i].needs_simulation()) simulated_.push_back(i);
+      programs_(std::make_shared<ScenePrograms>(scene_)),
+      simulated_(static_cast<std::size_t>(std::ranges::count_if(objectives_, &Objective::needs_simulation))) {
   find_unused();
+}
+
+namespace {
+
+std::vector<Evaluator> evaluators_of_cases(const Problem& problem, const std::vector<std::string>& objectives,
+                                           const std::vector<std::string>& variables, EvaluatorOptions options) {
+  if (options.progress && options.threads > 1 && problem.cases.size() > 1)  // all threads report to one listener
+    options.progress = [lock = std::make_shared<std::mutex>(), progress = options.progress](double t) {
+      const std::lock_guard guard(*lock);
+      return progress(t);
+    };
+  std::vector<Evaluator> evaluators;
+  const std::vector<Problem> problems = problems_of_cases(problem);
+  for (std::size_t c = 0; c < problems.size(); ++c) {
+    Problem needed = options.user_forces.empty() ? what_objectives_need(problems[c]) : problems[c];
+    std::vector<std::string> names = variables;
+    if (!problem.cases.empty()) {
+      for (std::string& name : names) name = name_in(problem.cases[c], name, problem.scene);
+      // A variable may have an effect in another case only.
+      for (Parameter& p : needed.scene.parameters) p.allow_unused = true;
+    }
+    const std::vector<Objective> all = objectives_of(needed, objectives);
+    evaluators.emplace_back(std::move(needed.scene), all, names, options);
+  }
+  return evaluators;
+}
+
+}  // namespace
+
+Evaluator::Evaluator(const Problem& problem, const std::vector<std::string>& objectives,
+                     const std::vector<std::string>& variables, const EvaluatorOptions& options)
+    : Evaluator(problem, evaluators_of_cases(problem, objectives, variables, options)) {}
+
+Evaluator::Evaluator(const Problem& problem, std::vector<Evaluator> cases) : Evaluator(cases.front()) {
+  if (problem.cases.empty()) return;
+  problem_ = std::make_shared<const Problem>(problem);
+  cases_ = std::move(cases);
+}
+
+Evaluator Evaluator::in(Scene scene, GradientMethod method) const {
+  Evaluator other = *this;
+  other.scene_ = std::move(scene), other.programs_ = std::make_shared<ScenePrograms>(other.scene_);
+  other.options_.method = method;
+  other.has_differentiated_ = false, other.last_ = {}, other.simulations_ = 0;
+  return other;
+}
+
+std::vector<bool> Evaluator::active(bool derivatives) const {
+  std::vector<bool> active(scene_.parameters.size(), false);
+  for (const int k : variables_) active[static_cast<std::size_t>(k)] = derivatives;
+  return active;
+}
+
+Mechanism Evaluator::mechanism(const Eigen::VectorXd& rho, bool derivatives) const {
+  return Mechanism(scene_, rho, active(derivatives), options_.user_forces, programs_);
+}
+
+const Parameter& Evaluator::variable(Eigen::Index k) const {
+  return scene_.parameters[static_cast<std::size_t>(variables_[static_cast<std::size_t>(k)])];
+}
+
+Eigen::VectorXd Evaluator::sizes(const Eigen::VectorXd& rho) const {
+  Eigen::VectorXd sizes(static_cast<Eigen::Index>(variables_.size()));
+  for (Eigen::Index k = 0; k < sizes.size(); ++k)
+    sizes(k) = typical_size(variable(k), rho(variables_[static_cast<std::size_t>(k)]));
+  return sizes;
+}
+
+Eigen::VectorXd Evaluator::start() const { return parameter_values(scene_); }
+
+long Evaluator::simulations() const {
+  return std::accumulate(cases_.begin(), cases_.end(), simulations_,
+                         [](long sum, const Evaluator& of_case) { return sum + of_case.simulations(); });
+}
+
+std::string Evaluator::in_case(std::size_t c, const std::string& what) const {
+  if (!problem_) return what;
+  const CaseSpec& load_case = problem_->cases[c];
+  return fmt::format("{} ({})", in_names_of_problem(what, load_case, problem_->scene), load_case.name);
+}
+
+void Evaluator::for_each_case(const std::function<void(std::size_t c)>& work) const {
+  std::vector<std::size_t> order(cases());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (last_.of_cases.size() == order.size())
+    std::ranges::stable_sort(order, std::greater(),
+                             [&](std::size_t c) { return last_.of_cases[c].statistics.rhs_evaluations; });
+  on_threads(order.size(), options_.threads, [&](std::size_t i) { work(order[i]); });
+}
+
+Evaluation Evaluator::in_cases(const Eigen::VectorXd& rho, Evaluation (Evaluator::*evaluate)(const Eigen::VectorXd&)) {
+  std::vector<Evaluation> found(cases());
+  for_each_case([&](std::size_t c) { found[c] = (cases_[c].*evaluate)(rho); });
+  const auto with_case = [&](std::size_t c, const std::string& words) {
+    const CaseSpec& load_case = problem_->cases[c];
+    return fmt::format("case '{}': {}", load_case.name, in_names_of_problem(words, load_case, problem_->scene));
+  };
+  const Eigen::Index n = static_cast<Eigen::Index>(objectives_.size()), rows = n * static_cast<Eigen::Index>(cases());
+  Evaluation all = found[0];
+  all.rho = rho;
+  all.psi.setZero(rows), all.psi_rho.setZero(all.has_gradients() ? rows : 0, all.psi_rho.cols());
+  all.simulations = 0, all.wall_seconds = 0, all.warnings.clear();
+  for (std::size_t c = 0; c < cases(); ++c) {
+    const Evaluation& e = found[c];
+    all.simulations += e.simulations, all.wall_seconds += e.wall_seconds;
+    for (const std::string& warning : e.warnings) all.warnings.push_back(with_case(c, warning));
+    if (!e.ok) {
+      if (all.ok || c == 0) all.message = with_case(c, e.message);
+      all.ok = false;
+      continue;
+    }
+    const Eigen::Index first = n * static_cast<Eigen::Index>(c);
+    all.psi.segment(first, n) = e.psi;
+    if (all.has_gradients() && e.has_gradients()) all.psi_rho.middleRows(first, n) = e.psi_rho;
+  }
+  all.of_cases = std::move(found);
+  return last_ = std::move(all);
 }
 
 void Evaluator::find_unused() {
@@ -92,7 +198,7 @@ void Evaluator::find_unused() {
 void Evaluator::judge_zero_columns(Evaluation& e) const {
   for (const std::size_t k : perhaps_unused_) {
     if (!e.ok || e.psi_rho.col(static_cast<Eigen::Index>(k)).any()) continue;
-    const std::string& name = scene_.parameters[static_cast<std::size_t>(variables_[k])].name;
+    const std::string& name = variable(static_cast<Eigen::Index>(k)).name;
     if (has_differentiated_) {
       e.warnings.push_back(fmt::format(
           "parameters.{}: its derivatives are all exactly 0 here: only C++ code uses it, and does not at these values",
@@ -107,16 +213,14 @@ void Evaluator::judge_zero_columns(Evaluation& e) const {
   }
 }
 
-Eigen::VectorXd Evaluator::start() const { return parameter_values(scene_); }
-
 Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const {
   const Stopwatch stopwatch;
   Evaluation e;
   e.rho = rho;
   e.psi.setZero(static_cast<Eigen::Index>(objectives_.size()));
   if (sweep != Sweep::none) e.psi_rho.setZero(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
-  e.ok = has_finite_parameters(e) && add_simulated(e, sweep, frozen, by_cvodes) &&
-         add_parameters_only(e, sweep != Sweep::none) && has_finite_objectives(e);
+  e.ok = has_finite_parameters(e) && add_simulated(e, sweep, frozen, by_cvodes) && add_parameters_only(e) &&
+         has_finite_objectives(e);
   e.wall_seconds = stopwatch.seconds();
   return e;
 }
@@ -142,26 +246,23 @@ bool Evaluator::has_finite_objectives(Evaluation& e) const {
 }
 
 bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const {
-  if (simulated_.empty()) return true;
+  if (simulated_ == 0) return true;
   const SimulationSettings settings = by_cvodes ? with_cvodes(scene_.simulation) : scene_.simulation;
   if (options_.progress && !options_.progress(settings.start_time)) {  // the assembly alone may take a second
     e.message = "stopped before its simulation";
     return false;
   }
-  // Derivatives are computed only if a sweep needs them.
-  const std::vector<bool> active = sweep == Sweep::none ? std::vector<bool>(active_.size(), false) : active_;
   SimulationResult result;
   try {
-    const Mechanism mechanism(scene_, e.rho, active, options_.user_forces, programs_);
-    ObjectiveRun objective_run(simulated(), mechanism, settings, options_.progress);
-    result = objective_run.run([&](std::span<const Cost> costs) {
-      const RunOptions run_options{
-          .frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
+    const Mechanism at_rho = mechanism(e.rho, sweep != Sweep::none);
+    const RunOptions options{.frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
+    const auto simulated = [&](std::span<const Cost> costs) {
       ++e.simulations;
-      return sweep == Sweep::forward    ? simulate_tlm(mechanism, settings, costs, {}, run_options)
-             : sweep == Sweep::backward ? simulate_adjoint(mechanism, settings, costs, run_options)
-                                        : simulate(mechanism, settings, costs, {}, run_options);
-    });
+      return sweep == Sweep::forward    ? simulate_tlm(at_rho, settings, costs, {}, options)
+             : sweep == Sweep::backward ? simulate_adjoint(at_rho, settings, costs, options)
+                                        : simulate(at_rho, settings, costs, {}, options);
+    };
+    result = run_objectives(objectives_, at_rho, settings, simulated, options_.progress);
   } catch (const SceneError& error) {  // a field that this rho drives out of its range
     e.message = error.what();
     return false;
@@ -173,60 +274,48 @@ bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* fr
   if (!frozen) e.warnings = simulation_warnings(scene_, settings, result.statistics, result.ok());
   e.steps = std::move(result.steps);
   e.message = result.message;
-  if (result.ok()) take(result, !frozen, e);
-  return result.ok();
-}
-
-void Evaluator::take(const SimulationResult& result, bool warn, Evaluation& e) const {
-  for (std::size_t j = 0; j < simulated_.size(); ++j) {
-    const Eigen::Index i = static_cast<Eigen::Index>(simulated_[j]), row = static_cast<Eigen::Index>(j);
-    e.psi(i) = result.psi(row);
-    if (!e.has_gradients()) continue;
-    const Objective& objective = objectives_[simulated_[j]];
-    if (objective.mean() && !objective.is_extreme() && e.psi(i) == 0 && warn)
+  if (!result.ok()) return false;
+  e.psi = result.psi;
+  if (!e.has_gradients()) return true;
+  e.psi_rho = result.psi_rho(Eigen::all, variables_);
+  for (std::size_t i = 0; i < objectives_.size() && !frozen; ++i)
+    if (objectives_[i].needs_simulation() && objectives_[i].mean() && !objectives_[i].is_extreme() &&
+        e.psi(static_cast<Eigen::Index>(i)) == 0)
       e.warnings.push_back(
           fmt::format("objective '{}' is a root mean square of 0, where it is not smooth: its gradient is given as 0",
-                      objective.name()));
-    for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
-      e.psi_rho(i, k) = result.psi_rho(row, variables_[static_cast<std::size_t>(k)]);
-  }
-}
-
-std::vector<const Objective*> Evaluator::simulated() const {
-  std::vector<const Objective*> list;
-  for (const std::size_t i : simulated_) list.push_back(&objectives_[i]);
-  return list;
+                      objectives_[i].name()));
+  return true;
 }
 
 std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd& rho) const {
-  std::vector<std::optional<double>> values(objectives_.size());
-  if (std::none_of(objectives_.begin(), objectives_.end(), [](const Objective& o) { return o.is_extreme(); }))
-    return values;
-  const Mechanism mechanism(scene_, rho, std::vector<bool>(active_.size(), false), options_.user_forces, programs_);
+  if (!cases_.empty()) {
+    std::vector<std::vector<std::optional<double>>> found(cases());
+    for_each_case([&](std::size_t c) { found[c] = cases_[c].true_values(rho); });
+    std::vector<std::optional<double>> all;
+    for (const auto& of_case : found) all.insert(all.end(), of_case.begin(), of_case.end());
+    return all;
+  }
+  const std::vector<std::optional<double>> none(objectives_.size());
+  if (std::ranges::none_of(objectives_, &Objective::is_extreme)) return none;
+  const Mechanism at_rho = mechanism(rho, false);
   const Evaluation e = run(rho, Sweep::none, nullptr);  // the costs decide on the panels of a solved run
-  if (!e.ok) return values;
-  const std::vector<std::optional<double>> found =
-      true_extremes(simulated(), mechanism, scene_.simulation, e.steps, options_.progress);
-  for (std::size_t j = 0; j < found.size(); ++j) values[simulated_[j]] = found[j];
-  return values;
+  return e.ok ? true_extremes(objectives_, at_rho, scene_.simulation, e.steps, options_.progress) : none;
 }
 
-bool Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {
-  Eigen::VectorXd gradient(e.rho.size());
+bool Evaluator::add_parameters_only(Evaluation& e) const {
   try {
     for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
       const Objective& objective = objectives_[static_cast<std::size_t>(i)];
-      if (!gradients) {
+      if (!e.has_gradients()) {
         e.psi(i) += objective.parameters_only(e.rho, options_.user_forces);
         continue;
       }
-      gradient.setZero();
+      Eigen::VectorXd gradient = Eigen::VectorXd::Zero(e.rho.size());
       std::vector<std::string> doubts;
       e.psi(i) += objective.add_parameters_only_gradient(e.rho, gradient, options_.user_forces, &doubts);
       for (const std::string& doubt : doubts)
         e.warnings.push_back(fmt::format("objective '{}': {}", objective.name(), doubt));
-      for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
-        e.psi_rho(i, k) += gradient(variables_[static_cast<std::size_t>(k)]);
+      e.psi_rho.row(i) += gradient(variables_).transpose();
     }
   } catch (const std::runtime_error& error) {  // of an eigenvalue
     e.message = error.what();
@@ -247,13 +336,7 @@ LadderDerivative certain_differences(const LadderFunction& psi_at, Eigen::Index 
     const Eigen::ArrayXd limit = (kUncertain * best.derivative.array().abs()).max(10 * best.rounding.array());
     if ((best.error.array() <= limit).all()) break;
     h /= 1 << rungs;
-    const LadderDerivative smaller = difference_ladder(psi_at, size, {h, rungs, 0});
-    for (Eigen::Index i = 0; i < size; ++i) {
-      if (!(smaller.error(i) < best.error(i))) continue;
-      best.error(i) = smaller.error(i), best.derivative(i) = smaller.derivative(i);
-      best.rounding(i) = smaller.rounding(i), best.step(i) = smaller.step(i);
-      best.largest(i) = smaller.largest(i);
-    }
+    best.take_better(difference_ladder(psi_at, size, {h, rungs, 0}));
   }
   return best;
 }
@@ -262,26 +345,24 @@ LadderDerivative certain_differences(const LadderFunction& psi_at, Eigen::Index 
 
 void Evaluator::add_differences(Evaluation& e) const {
   const Stopwatch stopwatch;
-  const StepSequence steps = e.steps;
-  Eigen::MatrixXd psi_rho(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
-  for (Eigen::Index k = 0; k < psi_rho.cols(); ++k) {
-    const int index = variables_[static_cast<std::size_t>(k)];
+  const bool frozen =
+      options_.differences.frozen_steps && simulated_ > 0 && !is_cvodes(scene_.simulation.integrator.type);
+  const Eigen::VectorXd size = sizes(e.rho);
+  Eigen::MatrixXd psi_rho(e.psi.size(), size.size());
+  for (Eigen::Index k = 0; k < size.size(); ++k) {
     const auto psi_at = [&](double h) -> std::optional<Eigen::VectorXd> {
       Eigen::VectorXd rho = e.rho;
-      rho(index) += h;
-      const bool frozen =
-          options_.differences.frozen_steps && !simulated_.empty() && !is_cvodes(scene_.simulation.integrator.type);
-      Evaluation shifted = run(rho, Sweep::none, frozen ? &steps : nullptr);
+      rho(variables_[static_cast<std::size_t>(k)]) += h;
+      Evaluation shifted = run(rho, Sweep::none, frozen ? &e.steps : nullptr);
       e.simulations += shifted.simulations;
       if (!shifted.ok) return std::nullopt;
       return shifted.psi;
     };
-    const Parameter& parameter = scene_.parameters[static_cast<std::size_t>(index)];
-    const double h = options_.differences.relative_step * typical_size(parameter, e.rho(index));
+    const double h = options_.differences.relative_step * size(k);
     const LadderDerivative d = certain_differences(psi_at, e.psi.size(), h, options_.differences.rungs);
     if (!(d.error.array() < std::numeric_limits<double>::infinity()).all()) {
       e.ok = false;
-      e.message = fmt::format("no central difference in '{}' could be evaluated", parameter.name);
+      e.message = fmt::format("no central difference in '{}' could be evaluated", variable(k).name);
       return;
     }
     psi_rho.col(k) = d.derivative;
@@ -291,6 +372,7 @@ void Evaluator::add_differences(Evaluation& e) const {
 }
 
 Evaluation Evaluator::values(const Eigen::VectorXd& rho) {
+  if (!cases_.empty()) return in_cases(rho, &Evaluator::values);
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho) return last_;
   last_ = run(rho, Sweep::none, nullptr);
   simulations_ += last_.simulations;
@@ -298,63 +380,60 @@ Evaluation Evaluator::values(const Eigen::VectorXd& rho) {
 }
 
 Evaluation Evaluator::values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const {
-  return run(rho, Sweep::none, simulated_.empty() ? nullptr : &steps);
+  return run(rho, Sweep::none, simulated_ == 0 ? nullptr : &steps);
 }
 
 Evaluation Evaluator::gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const {
   const bool backward = method == GradientMethod::adjoint;
-  if (!backward && method != GradientMethod::tlm && !simulated_.empty())
+  if (!backward && method != GradientMethod::tlm && simulated_ > 0)
     throw std::invalid_argument(
         fmt::format("gradients on given steps are by tlm or adjoint, not by {}", to_string(method)));
-  Evaluation e = run(rho, backward ? Sweep::backward : Sweep::forward, simulated_.empty() ? nullptr : &steps);
+  Evaluation e = run(rho, backward ? Sweep::backward : Sweep::forward, simulated_ == 0 ? nullptr : &steps);
   e.method = method;
   return e;
 }
 
 // Returns the requested method, or the one that replaces it; `choice` gives the reason if it is not obvious.
-GradientMethod Evaluator::available(GradientMethod method, std::string& choice) const {
+GradientMethod Evaluator::chosen_method(std::string& choice) const {
+  using enum GradientMethod;
+  const GradientMethod asked = options_.method;
   const IntegratorSettings& given = scene_.simulation.integrator;
   const bool by_cvodes = is_cvodes(given.type);
-  if (by_cvodes && (method == GradientMethod::tlm || method == GradientMethod::adjoint)) {
-    const GradientMethod instead =
-        method == GradientMethod::tlm ? GradientMethod::cvodes_forward : GradientMethod::cvodes_adjoint;
-    choice = fmt::format("{} instead of {}: {} has no discrete derivatives", to_string(instead), to_string(method),
+  const GradientMethod forward = by_cvodes ? cvodes_forward : tlm, backward = by_cvodes ? cvodes_adjoint : adjoint;
+  if (simulated_ == 0) return tlm;  // nothing to simulate: the objectives' own derivatives
+  if (asked == automatic) {
+    const GradientCost cost = gradient_cost(variables_.size(), simulated_);
+    const GradientMethod method = cost.tlm <= cost.adjoint ? forward : backward;
+    choice = fmt::format("{}: {}, {}; estimated cost in simulations: {} {:.1f}, {} {:.1f}", to_string(method),
+                         counted(variables_.size(), "variable"), counted(simulated_, "objective"), to_string(forward),
+                         cost.tlm, to_string(backward), cost.adjoint);
+    return method;
+  }
+  if (by_cvodes && (asked == tlm || asked == adjoint)) {
+    const GradientMethod instead = asked == tlm ? forward : backward;
+    choice = fmt::format("{} instead of {}: {} has no discrete derivatives", to_string(instead), to_string(asked),
                          given.type);
     return instead;
   }
-  if (!by_cvodes && (method == GradientMethod::cvodes_forward || method == GradientMethod::cvodes_adjoint)) {
-    choice = fmt::format("{}: motion and sensitivities by {} with rtol {:g}, atol {:g}, not by {}", to_string(method),
+  if (!by_cvodes && (asked == cvodes_forward || asked == cvodes_adjoint))
+    choice = fmt::format("{}: motion and sensitivities by {} with rtol {:g}, atol {:g}, not by {}", to_string(asked),
                          with_cvodes(scene_.simulation).integrator.type, given.rtol, given.atol, given.type);
-  }
-  return method;
+  return asked;
 }
 
 Evaluation Evaluator::gradients(const Eigen::VectorXd& rho) {
+  if (!cases_.empty()) return in_cases(rho, &Evaluator::gradients);
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
       (last_.has_gradients() || !last_.ok))
     return last_;
-  if (!simulated_.empty() && !has_differentiated_) {
+  if (simulated_ > 0 && !has_differentiated_) {
     // At other values than the scene's own, the loop may close as a structure that cannot move.
     const Eigen::VectorXd own = start();
-    require_unobstructed(scene_, own, active_, options_.user_forces);
-    if (rho.size() != own.size() || rho != own) require_unobstructed(scene_, rho, active_, options_.user_forces);
+    require_unobstructed(scene_, own, active(true), options_.user_forces);
+    if (rho.size() != own.size() || rho != own) require_unobstructed(scene_, rho, active(true), options_.user_forces);
   }
-  GradientMethod method = options_.method;
   std::string choice;
-  if (simulated_.empty()) {
-    method = GradientMethod::tlm;  // nothing to simulate: the objectives' own derivatives
-  } else if (method == GradientMethod::automatic) {
-    const GradientCost cost = gradient_cost(variables_.size(), simulated_.size());
-    const bool by_cvodes = is_cvodes(scene_.simulation.integrator.type);
-    const GradientMethod forward = by_cvodes ? GradientMethod::cvodes_forward : GradientMethod::tlm,
-                         backward = by_cvodes ? GradientMethod::cvodes_adjoint : GradientMethod::adjoint;
-    method = cost.tlm <= cost.adjoint ? forward : backward;
-    choice = fmt::format("{}: {}, {}; estimated cost in simulations: {} {:.1f}, {} {:.1f}", to_string(method),
-                         counted(variables_.size(), "variable"), counted(simulated_.size(), "objective"),
-                         to_string(forward), cost.tlm, to_string(backward), cost.adjoint);
-  } else {
-    method = available(method, choice);
-  }
+  const GradientMethod method = chosen_method(choice);
   if (method == GradientMethod::differences) {
     last_ = run(rho, Sweep::none, nullptr);
     if (last_.ok) add_differences(last_);
@@ -365,7 +444,7 @@ Evaluation Evaluator::gradients(const Eigen::VectorXd& rho) {
   }
   judge_zero_columns(last_);
   has_differentiated_ = has_differentiated_ || last_.ok;
-  last_.method = simulated_.empty() ? GradientMethod::automatic : method;
+  last_.method = simulated_ == 0 ? GradientMethod::automatic : method;
   last_.choice = std::move(choice);
   simulations_ += last_.simulations;
   return last_;

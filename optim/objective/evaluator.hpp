@@ -5,6 +5,12 @@
 //   const Evaluation e = evaluator.gradients(evaluator.start());
 //   if (!e.ok) std::cerr << e.message;
 //   e.psi(0), e.psi_rho(0, 1);   // the first objective, and its derivative in L01
+//
+// The evaluator of a problem with load cases has one for each of them. Threads compute the cases; results do not depend
+// on their number.
+//
+//   Evaluator evaluator(problem, {"track", "peak"}, {"k1"}, {.threads = 2});
+//   evaluator.gradients(rho).psi(2 * c + 1);   // peak in case c
 #pragma once
 
 #include <Eigen/Core>
@@ -18,13 +24,15 @@
 #include "core/simulate/simulation.hpp"
 #include "optim/objective/objective.hpp"
 #include "optim/problem/parameter_values.hpp"
+#include "optim/problem/problem.hpp"
 
 namespace mbsopt::inline optim {
 
 // tlm and adjoint are the derivatives of the computed numbers; CVODES has none of these and gives its own. With
 // cvodes_*, CVODES computes the motion and its continuous sensitivities for any integrator of the scene (cvodes.hpp).
 enum class GradientMethod { automatic, tlm, adjoint, cvodes_forward, cvodes_adjoint, differences };
-std::string_view to_string(GradientMethod method);  // auto, tlm, adjoint, cvodes_forward, cvodes_adjoint, fd
+std::string_view to_string(
+    GradientMethod method);  // in this order: auto, tlm, adjoint, cvodes_forward, cvodes_adjoint, fd
 
 struct DifferenceSettings {
   double relative_step = 4e-3;  // the largest: of the parameter's value, or of 1 where that is 0
@@ -43,6 +51,8 @@ struct GradientCost {
 };
 GradientCost gradient_cost(std::size_t variables, std::size_t objectives);
 
+// In load cases: psi and its derivatives case by case, each with all objectives. ok holds if all cases are ok.
+// Statistics are those of the first.
 struct Evaluation {
   bool ok = false;
   std::string message;                                // why not, in words
@@ -56,15 +66,18 @@ struct Evaluation {
   StepSequence steps;
   long simulations = 0;  // number for this evaluation
   double wall_seconds = 0;
+  std::vector<Evaluation> of_cases;  // empty where the problem has no load cases
+  const Evaluation& of_case(std::size_t c) const { return of_cases.empty() ? *this : of_cases[c]; }
   bool has_gradients() const { return psi_rho.size() > 0; }
 };
 
 struct EvaluatorOptions {
   GradientMethod method = GradientMethod::automatic;
-  DifferenceSettings differences;
-  std::vector<std::shared_ptr<const UserForce>> user_forces;
-  std::function<bool(double t)> progress;  // after accepted steps; false abandons the evaluation
-  bool exact_stages = true;                // of values(), as in RunOptions: those of gradients() always are
+  DifferenceSettings differences = {};
+  std::vector<std::shared_ptr<const UserForce>> user_forces = {};
+  std::function<bool(double t)> progress = {};  // after accepted steps; false abandons the evaluation
+  bool exact_stages = true;                     // of values(), as in RunOptions: those of gradients() always are
+  int threads = 1;                              // that compute load cases
 };
 
 class Evaluator {
@@ -74,6 +87,10 @@ class Evaluator {
   // in C++ use. The first call fails if all derivatives of such a variable are exactly 0; later calls warn.
   Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables = {},
             EvaluatorOptions options = {});
+  // The named objectives in all load cases. A problem without cases is its own only case. Each case is reduced to the
+  // needs of its objectives. Forces written in C++ prevent this, because they name bodies by number.
+  Evaluator(const Problem& problem, const std::vector<std::string>& objectives,
+            const std::vector<std::string>& variables, const EvaluatorOptions& options = {});
 
   Evaluation values(const Eigen::VectorXd& rho);
   Evaluation gradients(const Eigen::VectorXd& rho);
@@ -83,44 +100,62 @@ class Evaluator {
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
 
   // Evaluates on given steps and leaves the stored point unchanged: values, and discrete gradients by tlm or adjoint.
-  // CVODES cannot take given steps and throws std::invalid_argument.
+  // CVODES cannot take given steps and throws std::invalid_argument. Not in load cases.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
   Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
 
+  // The same objectives and variables of another scene, such as one with other tolerances.
+  Evaluator in(Scene scene, GradientMethod method) const;
+  // The mechanism at rho, with derivatives in the variables or without any.
+  Mechanism mechanism(const Eigen::VectorXd& rho, bool derivatives) const;
+
+  std::size_t cases() const { return cases_.empty() ? 1 : cases_.size(); }
+  Evaluator& of_case(std::size_t c) { return cases_.empty() ? *this : cases_[c]; }
+  const Evaluator& of_case(std::size_t c) const { return cases_.empty() ? *this : cases_[c]; }
+  std::string case_name(std::size_t c) const { return problem_ ? problem_->cases[c].name : std::string(); }
+  std::string in_case(std::size_t c, const std::string& what) const;  // "what (cold)", with the problem's names
+  // Calls work(c) in up to options().threads threads. The case with most right-hand sides in the last evaluation is
+  // first.
+  void for_each_case(const std::function<void(std::size_t c)>& work) const;
+
+  // Scene and objectives are those of the first case.
   const Scene& scene() const { return scene_; }
   const EvaluatorOptions& options() const { return options_; }
-  const std::shared_ptr<ScenePrograms>& programs() const { return programs_; }  // of the scene
   const std::vector<Objective>& objectives() const { return objectives_; }
   const std::vector<int>& variables() const { return variables_; }  // indices of parameters
-  Eigen::VectorXd start() const;                                    // the parameters' values in the scene
-  long simulations() const { return simulations_; }                 // since construction
+  const Parameter& variable(Eigen::Index k) const;
+  Eigen::VectorXd sizes(const Eigen::VectorXd& rho) const;  // typical_size of each variable
+  Eigen::VectorXd start() const;                            // the parameters' values in the scene
+  long simulations() const;                                 // since construction
 
  private:
   enum class Sweep { none, forward, backward };
+  Evaluator(const Problem& problem, std::vector<Evaluator> cases);
+  std::vector<bool> active(bool derivatives) const;  // parameters
+  Evaluation in_cases(const Eigen::VectorXd& rho, Evaluation (Evaluator::*evaluate)(const Eigen::VectorXd&));
   Evaluation run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen, bool by_cvodes = false) const;
-  GradientMethod available(GradientMethod method, std::string& choice) const;
   // Parts of run(). They return false if the point cannot be evaluated; e.message then gives the reason.
   bool has_finite_parameters(Evaluation& e) const;
   bool add_simulated(Evaluation& e, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const;
-  bool add_parameters_only(Evaluation& e, bool gradients) const;
+  bool add_parameters_only(Evaluation& e) const;
   bool has_finite_objectives(Evaluation& e) const;
-  void take(const SimulationResult& result, bool warn, Evaluation& e) const;
+  GradientMethod chosen_method(std::string& choice) const;
   void add_differences(Evaluation& e) const;
   void find_unused();
   void judge_zero_columns(Evaluation& e) const;
-  std::vector<const Objective*> simulated() const;
 
   Scene scene_;
   std::vector<Objective> objectives_;
   std::vector<int> variables_;
-  std::vector<bool> active_;
   EvaluatorOptions options_;
   std::shared_ptr<ScenePrograms> programs_;
-  std::vector<std::size_t> simulated_;       // objectives that need a simulation
+  std::size_t simulated_ = 0;                // objectives that need a simulation
   std::vector<std::size_t> perhaps_unused_;  // variables that only what is written in C++ may use
   bool has_differentiated_ = false;          // gradients() has succeeded: no loop is a structure that cannot move
   Evaluation last_;
   long simulations_ = 0;
+  std::shared_ptr<const Problem> problem_;  // with load cases; else null
+  std::vector<Evaluator> cases_;            // one for each
 };
 
 }  // namespace mbsopt::inline optim

@@ -5,9 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-
-#include "optim/objective/hessian.hpp"
-
 namespace mbsopt::inline optim {
 namespace {
 
@@ -84,7 +81,13 @@ std::vector<Look> looks_of(const std::vector<Objective>& objectives, const StepS
 
 }  // namespace
 
-GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
+Hessians gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
+  Hessians result;
+  result.gradients = 1;
+  if (!at.ok) {
+    result.message = at.message;
+    return result;
+  }
   const std::vector<Objective>& objectives = evaluator.objectives();
   const std::vector<int>& variables = evaluator.variables();
   require_second_order(evaluator.scene(), GradientMethod::automatic);
@@ -102,13 +105,10 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
     for (const ObjectivePart& part : objective.parts())
       parts.emplace_back(objective, part, static_cast<Index>(variables.size()));
   }
-  GaussNewton result;
   if (simulated) {
-    const Scene& scene = evaluator.scene();
-    std::vector<bool> active(scene.parameters.size(), false);
-    for (const int k : variables) active[static_cast<std::size_t>(k)] = true;
-    const Mechanism mechanism(scene, at.rho, active, evaluator.options().user_forces, evaluator.programs());
-    const std::vector<Look> looks = looks_of(objectives, at.steps, scene.simulation.end_time);
+    const SimulationSettings& settings = evaluator.scene().simulation;
+    const Mechanism mechanism = evaluator.mechanism(at.rho, true);
+    const std::vector<Look> looks = looks_of(objectives, at.steps, settings.end_time);
     TangentSampling sampling;
     for (const Look& look : looks) sampling.times.push_back(look.time);
     sampling.observe = [&](std::size_t index, const StatePoint& state, const MatrixXd& y_rho) {
@@ -123,14 +123,15 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
       }
     };
     const SimulationResult run =
-        simulate_tlm(mechanism, scene.simulation, {}, sampling, {&at.steps, evaluator.options().progress});
+        simulate_tlm(mechanism, settings, {}, sampling, {&at.steps, evaluator.options().progress});
     if (!run.ok()) {
       result.message = run.message;
       return result;
     }
   }
   for (std::size_t i = 0; i < objectives.size(); ++i) {
-    MatrixXd& H = result.of.emplace_back(gathered[i].front().hessian());
+    MatrixXd& H = result.of.emplace_back().value;
+    H = gathered[i].front().hessian();
     for (std::size_t p = 1; p < gathered[i].size(); ++p) H += gathered[i][p].hessian();
     objectives[i].add_parameters_only_hessian(at.rho, variables, H);
   }

@@ -10,26 +10,17 @@
 // convex in u. It is near the exact Hessian where the wanted motion is met, e_s = 0. It costs one tangent-linear run;
 // an exact Hessian costs several per variable.
 //
-//   const GaussNewton H = gauss_newton(evaluator, evaluator.gradients(rho));
-//   if (H.ok) H.of[0];     // of the first objective, variable x variable
+//   const Hessians H = gauss_newton(evaluator, evaluator.gradients(rho));
+//   if (H.ok) H.of[0].value;     // of the first objective, variable x variable
 #pragma once
 
-#include <Eigen/Core>
-#include <string>
-#include <vector>
-
-#include "optim/objective/evaluator.hpp"
+#include "optim/objective/hessian.hpp"
 
 namespace mbsopt::inline optim {
 
-struct GaussNewton {
-  bool ok = false;
-  std::string message;              // why not, in words
-  std::vector<Eigen::MatrixXd> of;  // per objective
-};
-
-// Uses the steps of a valid evaluation, with three Gauss points per step on the dense output for integrals. Throws
-// std::invalid_argument for objectives written in C++, which have no second derivatives, and for CVODES' integrators.
-GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at);
+// Uses the steps of the evaluation, with three Gauss points per step on the dense output for integrals. Errors of the
+// matrices are not known. Throws std::invalid_argument for objectives written in C++, which have no second derivatives,
+// and for CVODES' integrators.
+Hessians gauss_newton(const Evaluator& evaluator, const Evaluation& at);
 
 }  // namespace mbsopt::inline optim

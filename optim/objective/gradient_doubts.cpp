@@ -26,18 +26,13 @@ std::vector<std::string> contradictions(const Evaluator& evaluator, const Evalua
   std::mt19937 generator{1};
   std::uniform_real_distribution<double> part(0.5, 1);
   const Scene& scene = evaluator.scene();
-  VectorXd d(at.psi_rho.cols());
-  std::vector<std::string> names;
-  for (Eigen::Index j = 0; const int k : evaluator.variables()) {
-    const Parameter& p = scene.parameters[static_cast<std::size_t>(k)];
-    names.push_back(p.name);
-    d(j++) = typical_size(p, at.rho(k)) * part(generator) * (generator() % 2 == 0 ? 1 : -1);
-  }
+  VectorXd d = evaluator.sizes(at.rho);
+  for (double& component : d) component = component * part(generator) * (generator() % 2 == 0 ? 1 : -1);
   const Scene tight = with_errors_times(0.1, scene, at.statistics.steps);
-  Evaluator there(tight, evaluator.objectives(), names, evaluator.options());
+  Evaluator there = evaluator.in(tight, evaluator.options().method);
   const auto psi_at = [&](double h) -> std::optional<VectorXd> {
     VectorXd rho = at.rho;
-    for (Eigen::Index j = 0; const int k : evaluator.variables()) rho(k) += h * d(j++);
+    rho(evaluator.variables()) += h * d;
     const Evaluation e = there.values(rho);
     if (!e.ok) return std::nullopt;
     return e.psi;
@@ -77,31 +72,22 @@ std::vector<std::string> gradient_doubts(const Evaluator& evaluator, const Evalu
   if (std::ranges::any_of(at.statistics.jumps, [](const Jump& jump) { return jump.size == 0; }))
     said = contradictions(evaluator, at, undecided);
   if (!said.empty()) return said;
-  const Scene& scene = evaluator.scene();
-  Scene of_variables = scene;
-  of_variables.parameters.clear();
-  std::vector<std::string> names;
-  for (const int k : evaluator.variables()) {
-    of_variables.parameters.push_back(scene.parameters[static_cast<std::size_t>(k)]);
-    of_variables.parameters.back().value = at.rho(k);
-    names.push_back(of_variables.parameters.back().name);
-  }
-  if (!undecided && !may_be_unresolved(of_variables, evaluator.objectives(), at)) return said;
+  if (!undecided && !may_be_unresolved(evaluator, at)) return said;
   // TLM and adjoint differ in their rounding, too.
-  EvaluatorOptions options = evaluator.options();
-  if (at.method == GradientMethod::tlm) options.method = GradientMethod::adjoint;
-  if (at.method == GradientMethod::adjoint) options.method = GradientMethod::tlm;
+  GradientMethod method = evaluator.options().method;
+  if (at.method == GradientMethod::tlm) method = GradientMethod::adjoint;
+  if (at.method == GradientMethod::adjoint) method = GradientMethod::tlm;
   const long steps = at.statistics.steps;
-  Evaluator other(with_other_tolerances(scene, steps).value_or(with_errors_times(0.1, scene, steps)),
-                  evaluator.objectives(), names, options);
-  const Evaluation& e = other.gradients(at.rho);
+  const Scene& scene = evaluator.scene();
+  Evaluator other =
+      evaluator.in(with_other_tolerances(scene, steps).value_or(with_errors_times(0.1, scene, steps)), method);
+  const Evaluation e = other.gradients(at.rho);
   if (!e.ok)
     return {
         fmt::format("the steps may not resolve the gradients, which a run with other tolerances would show if it "
                     "did not fail: {}",
                     e.message)};
-  return unresolved_gradients(of_variables, evaluator.objectives(), at.psi, at.psi_rho,
-                              {(e.psi - at.psi).cwiseAbs(), (e.psi_rho - at.psi_rho).cwiseAbs()});
+  return unresolved_gradients(evaluator, at, {(e.psi - at.psi).cwiseAbs(), (e.psi_rho - at.psi_rho).cwiseAbs()});
 }
 
 }  // namespace mbsopt::inline optim

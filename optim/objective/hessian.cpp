@@ -34,10 +34,9 @@ constexpr int kWiderLadders = 2;
 class GradientAlong {
  public:
   GradientAlong(Evaluator& evaluator, const VectorXd& rho, const HessianOptions& options)
-      : evaluator_(evaluator), options_(options), rho_(rho), size_(evaluator.variables().size()) {
+      : evaluator_(evaluator), options_(options), rho_(rho), size_(evaluator.sizes(rho)) {
     require_second_order(evaluator.scene(), evaluator.options().method);
     base_ = evaluator.gradients(rho);
-    for (Index k = 0; k < size_.size(); ++k) size_(k) = typical_size(parameter(k), rho(index(k)));
   }
 
   bool ok() const { return base_.ok; }
@@ -47,8 +46,9 @@ class GradientAlong {
   Index variables() const { return size_.size(); }
   Index objectives() const { return base_.psi.size(); }
   long gradients() const { return gradients_; }
-  const Parameter& parameter(Index k) const {
-    return evaluator_.scene().parameters[static_cast<std::size_t>(index(k))];
+  const Parameter& parameter(Index k) const { return evaluator_.variable(k); }
+  double largest_gradient(Index objective) const {
+    return base_.psi_rho.row(objective).transpose().cwiseProduct(size_).cwiseAbs().maxCoeff();
   }
 
   // F'(0) along d, which is given in sizes with its largest component 1. It has no estimates if it could not be
@@ -61,12 +61,7 @@ class GradientAlong {
       if (reach.step < h) break;  // the bounds are all the room there is
       h *= kGrowth;
       reach = reach_along(d, h);
-      const LadderDerivative wider = without_constants(ladder(d, reach));
-      for (Index c = 0; c < best.error.size(); ++c) {
-        if (!(wider.error(c) < best.error(c))) continue;
-        best.derivative(c) = wider.derivative(c), best.error(c) = wider.error(c);
-        best.rounding(c) = wider.rounding(c), best.step(c) = wider.step(c);
-      }
+      best.take_better(without_constants(ladder(d, reach)));
     }
     return best;
   }
@@ -145,10 +140,6 @@ class GradientAlong {
     for (Index c = 0; c < found.error.size(); ++c)
       if (found.derivative(c) == 0 && found.has_estimate(c) && found.error(c) == found.rounding(c)) found.error(c) = 0;
     return found;
-  }
-
-  double largest_gradient(Index objective) const {
-    return base_.psi_rho.row(objective).transpose().cwiseProduct(size_).cwiseAbs().maxCoeff();
   }
 
   bool good_enough(const LadderDerivative& best) const {
@@ -248,9 +239,7 @@ Hessians hessians(Evaluator& evaluator, const VectorXd& rho, const HessianOption
   for (Index i = 0; i < m; ++i) {
     const auto at = static_cast<std::size_t>(i);
     result.of.push_back(symmetrised(raw[at], error[at], along.sizes()));
-    if (n > 0)
-      result.of.back().gradient =
-          along.base().psi_rho.row(i).transpose().cwiseProduct(along.sizes()).cwiseAbs().maxCoeff();
+    if (n > 0) result.of.back().gradient = along.largest_gradient(i);
   }
   result.ok = true;
   result.wall_seconds = stopwatch.seconds();

@@ -15,16 +15,6 @@ constexpr double kResolved = 1e-4;   // of a gradient: less affects no optimiser
 
 double other_errors(const IntegratorSettings& given) { return given.rtol > 10 * kTightest ? 0.1 : 10; }
 
-// |psi_rho| times the parameters' sizes.
-Eigen::MatrixXd contributions(const Scene& scene, const Eigen::MatrixXd& psi_rho) {
-  Eigen::MatrixXd sized = psi_rho.cwiseAbs();
-  for (Eigen::Index k = 0; k < sized.cols(); ++k) {
-    const Parameter& p = scene.parameters[static_cast<std::size_t>(k)];
-    sized.col(k) *= typical_size(p, p.value);
-  }
-  return sized;
-}
-
 }  // namespace
 
 Scene with_errors_times(double factor, Scene scene, long steps) {
@@ -49,60 +39,62 @@ std::optional<Scene> with_other_tolerances(Scene scene, long steps) {
   return with_errors_times(factor, std::move(scene), steps);
 }
 
-IntegrationError integration_error(const Scene& scene, const std::vector<Objective>& objectives,
-                                   const Eigen::VectorXd& psi, const Eigen::MatrixXd& psi_rho,
-                                   const IntegrationErrorOptions& options) {
+IntegrationError integration_error(const Evaluator& evaluator, const Evaluation& at, GradientMethod method,
+                                   bool fixed_steps) {
   IntegrationError error;
-  error.psi.setZero(psi.size()), error.psi_rho.setZero(psi_rho.rows(), psi_rho.cols());
-  const IntegratorSettings& given = scene.simulation.integrator;
-  if (given.step && !options.fixed_steps) return error;
-  if (!given.step) error.psi_rho = given.rtol * psi_rho.cwiseAbs();
-  Evaluator evaluator(with_errors_times(given.step ? 0.1 : other_errors(given), scene, options.steps), objectives, {},
-                      {options.method, {}, options.user_forces, options.progress});
-  const Evaluation& e = evaluator.gradients(evaluator.start());
+  error.psi.setZero(at.psi.size()), error.psi_rho.setZero(at.psi_rho.rows(), at.psi_rho.cols());
+  const IntegratorSettings& given = evaluator.scene().simulation.integrator;
+  if (given.step && !fixed_steps) return error;
+  if (!given.step) error.psi_rho = given.rtol * at.psi_rho.cwiseAbs();
+  const double factor = given.step ? 0.1 : other_errors(given);
+  Evaluator other = evaluator.in(with_errors_times(factor, evaluator.scene(), at.statistics.steps), method);
+  const Evaluation e = other.gradients(at.rho);
   error.simulations = e.simulations;
   if (!e.ok) return error;
-  error.psi = error.psi.cwiseMax((e.psi - psi).cwiseAbs());
-  error.psi_rho = error.psi_rho.cwiseMax((e.psi_rho - psi_rho).cwiseAbs());
+  error.psi = error.psi.cwiseMax((e.psi - at.psi).cwiseAbs());
+  error.psi_rho = error.psi_rho.cwiseMax((e.psi_rho - at.psi_rho).cwiseAbs());
   return error;
 }
 
-bool may_be_unresolved(const Scene& scene, const std::vector<Objective>& objectives, const Evaluation& e) {
+bool may_be_unresolved(const Evaluator& evaluator, const Evaluation& e) {
   constexpr double kDrift = 0.1;  // derivatives of a motion that leaves the constraints are off by more than it is
   const SimulationStatistics& s = e.statistics;
   if (std::max({s.quadrature.error, s.extreme_quadrature.error, s.gradient_quadrature.error}) > kResolved) return true;
-  const IntegratorSettings& given = scene.simulation.integrator;
+  const IntegratorSettings& given = evaluator.scene().simulation.integrator;
   if (given.step) return false;
   if (s.relative_position_violation > kDrift * kResolved) return true;
+  const std::vector<Objective>& objectives = evaluator.objectives();
   for (std::size_t i = 0; i < objectives.size(); ++i)
     if (objectives[i].mean() && !objectives[i].is_extreme() &&
         given.rtol + given.atol > kResolved * e.psi(static_cast<Eigen::Index>(i)))
       return true;
-  const Eigen::VectorXd changes = contributions(scene, e.psi_rho).rowwise().sum();
+  const Eigen::VectorXd changes = e.psi_rho.cwiseAbs() * evaluator.sizes(e.rho);
   return (given.rtol * changes.array() > kResolved * e.psi.array().abs()).any();
 }
 
-std::vector<std::string> unresolved_gradients(const Scene& scene, const std::vector<Objective>& objectives,
-                                              const Eigen::VectorXd& psi, const Eigen::MatrixXd& psi_rho,
+std::vector<std::string> unresolved_gradients(const Evaluator& evaluator, const Evaluation& at,
                                               const IntegrationError& error) {
   constexpr double kNothing = 1e-3;  // of psi: a gradient below it is compared with it, as `check` does
-  const Eigen::MatrixXd sized = contributions(scene, psi_rho), errors = contributions(scene, error.psi_rho);
+  const IntegratorSettings& given = evaluator.scene().simulation.integrator;
+  const Eigen::VectorXd sizes = evaluator.sizes(at.rho);
+  const Eigen::MatrixXd sized = at.psi_rho.cwiseAbs() * sizes.asDiagonal(),
+                        errors = error.psi_rho.cwiseAbs() * sizes.asDiagonal();
   std::vector<std::string> sentences;
-  for (Eigen::Index i = 0; i < psi.size() && psi_rho.cols() > 0; ++i) {
+  for (Eigen::Index i = 0; i < at.psi.size() && sizes.size() > 0; ++i) {
     Eigen::Index k = 0;
     const double worst = errors.row(i).maxCoeff(&k);
-    const double size = std::max(sized.row(i).maxCoeff(), kNothing * std::abs(psi(i)));
+    const double size = std::max(sized.row(i).maxCoeff(), kNothing * std::abs(at.psi(i)));
     // An objective of the size of atol is zero to the integrator, and its gradient rounding.
-    if (size == 0 || !(worst > kResolved * std::max(size, scene.simulation.integrator.atol))) continue;
+    if (size == 0 || !(worst > kResolved * std::max(size, given.atol))) continue;
     sentences.push_back(fmt::format(
         "the steps do not resolve the gradient of objective '{}': another run with {} the integration errors "
         "changes its entry of '{}' by {:.2g}, {:.2g} % of the largest. {}",
-        objectives[static_cast<std::size_t>(i)].name(),
-        scene.simulation.integrator.step || other_errors(scene.simulation.integrator) < 1 ? "a tenth of" : "ten times",
-        scene.parameters[static_cast<std::size_t>(k)].name, error.psi_rho(i, k), 100 * worst / size,
-        scene.simulation.integrator.step ? "Take a smaller simulation.integrator.step"
-                                         : "Set simulation.integrator.max_step or tighten rtol and atol; where that "
-                                           "changes nothing, the motion magnifies errors, and a shorter run helps"));
+        evaluator.objectives()[static_cast<std::size_t>(i)].name(),
+        given.step || other_errors(given) < 1 ? "a tenth of" : "ten times", evaluator.variable(k).name,
+        error.psi_rho(i, k), 100 * worst / size,
+        given.step ? "Take a smaller simulation.integrator.step"
+                   : "Set simulation.integrator.max_step or tighten rtol and atol; where that changes nothing, the "
+                     "motion magnifies errors, and a shorter run helps"));
   }
   return sentences;
 }

@@ -4,8 +4,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,20 +13,10 @@
 
 namespace mbsopt::inline optim {
 
-class Objective;
-
 struct IntegrationError {
   Eigen::VectorXd psi;      // per objective, >= 0
-  Eigen::MatrixXd psi_rho;  // objective x parameter, >= 0
+  Eigen::MatrixXd psi_rho;  // objective x variable, >= 0
   long simulations = 0;
-};
-
-struct IntegrationErrorOptions {
-  std::vector<std::shared_ptr<const UserForce>> user_forces = {};
-  std::function<bool(double t)> progress = {};  // within a simulation; false abandons it
-  GradientMethod method = GradientMethod::automatic;
-  bool fixed_steps = false;  // estimate their error, too
-  long steps = 0;            // of the run that gave psi and psi_rho
 };
 
 // The scene with factor times the integration errors. It multiplies tolerances by factor, and max_step and step by
@@ -40,21 +28,19 @@ Scene with_errors_times(double factor, Scene scene, long steps = 0);
 // The scene with ten times tighter tolerances, or looser ones; none if its steps are fixed.
 std::optional<Scene> with_other_tolerances(Scene scene, long steps = 0);
 
-// psi and psi_rho belong to the parameters and tolerances of the scene.
-IntegrationError integration_error(const Scene& scene, const std::vector<Objective>& objectives,
-                                   const Eigen::VectorXd& psi, const Eigen::MatrixXd& psi_rho,
-                                   const IntegrationErrorOptions& options = {});
+// Of an evaluation with gradients, by a method of the caller's choice. fixed_steps: estimate their error, too.
+IntegrationError integration_error(const Evaluator& evaluator, const Evaluation& at,
+                                   GradientMethod method = GradientMethod::automatic, bool fixed_steps = false);
 
 // Returns whether the estimates of every run allow that a gradient is off by more than kResolved. The estimates are
 // those of its integrals, and rtol times the motion's magnification of a change of parameters. The gradient of an rms
 // divides by the rms: if the rms is hardly larger than the tolerances, the gradient may be all error. Joints that come
 // apart (CVODES does not project) are a doubt, too.
-bool may_be_unresolved(const Scene& scene, const std::vector<Objective>& objectives, const Evaluation& gradients);
+bool may_be_unresolved(const Evaluator& evaluator, const Evaluation& gradients);
 
 // Reports, in sentences, gradients that are off by more than kResolved of their largest entry. Each entry is multiplied
 // by its parameter's size.
-std::vector<std::string> unresolved_gradients(const Scene& scene, const std::vector<Objective>& objectives,
-                                              const Eigen::VectorXd& psi, const Eigen::MatrixXd& psi_rho,
+std::vector<std::string> unresolved_gradients(const Evaluator& evaluator, const Evaluation& gradients,
                                               const IntegrationError& error);
 
 }  // namespace mbsopt::inline optim

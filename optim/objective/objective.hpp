@@ -12,7 +12,7 @@
 //   const SimulationResult run = simulate(mechanism, scene.simulation, std::vector{track.cost(mechanism)});
 //   const double psi = track.of_integral(run.psi(0)).value + track.parameters_only(rho);
 //
-// ObjectiveRun (objective_run.hpp) does this for several objectives and finds x0.
+// run_objectives (objective_run.hpp) does this for several objectives and finds x0.
 #pragma once
 
 #include <functional>

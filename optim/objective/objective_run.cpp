@@ -57,17 +57,28 @@ class Peak {
   std::vector<Top> tops_;
 };
 
-// A side of an objective, with the meaning of ObjectivePart.
-struct ExtremeOf {
+// The integral of one part of an objective.
+struct Integral {
   const Objective* objective;
-  int side;
+  Eigen::Index row;  // of the objective
+  ObjectivePart part;
+  double x0 = 0;
 };
 
-// The extreme of each objective's expression on its side. There is none for side 0, or if the run fails.
-std::vector<std::optional<double>> extremes_of(const std::vector<ExtremeOf>& all, const Mechanism& mechanism,
+std::vector<Integral> integrals_of(const std::vector<Objective>& objectives) {
+  std::vector<Integral> integrals;
+  for (std::size_t i = 0; i < objectives.size(); ++i)
+    if (objectives[i].needs_simulation())
+      for (const ObjectivePart& part : objectives[i].parts())
+        integrals.push_back({&objectives[i], static_cast<Eigen::Index>(i), part});
+  return integrals;
+}
+
+// The extreme of each objective's expression on the side of its part. There is none for side 0, or if the run fails.
+std::vector<std::optional<double>> extremes_of(const std::vector<Integral>& integrals, const Mechanism& mechanism,
                                                const SimulationSettings& settings, const StepSequence& steps,
                                                const std::function<bool(double t)>& progress) {
-  std::vector<std::optional<double>> values(all.size());
+  std::vector<std::optional<double>> values(integrals.size());
   struct Tracked {
     std::size_t index;
     double side;
@@ -75,14 +86,9 @@ std::vector<std::optional<double>> extremes_of(const std::vector<ExtremeOf>& all
     Peak peak;
   };
   std::vector<Tracked> tracked;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (all[i].side == 0) continue;
-    if (auto x = all[i].objective->expression(mechanism)) {
-      tracked.push_back({i, static_cast<double>(all[i].side), std::move(x), {}});
-    } else {
-      values[i] = 0;
-    }
-  }
+  for (std::size_t i = 0; i < integrals.size(); ++i)
+    if (const int side = integrals[i].part.side; side != 0)
+      tracked.push_back({i, static_cast<double>(side), integrals[i].objective->expression(mechanism), {}});
   if (tracked.empty()) return values;
   Sampling sampling;
   sampling.times = output_times(settings);  // no row of a trajectory exceeds a true extreme
@@ -116,63 +122,8 @@ std::vector<std::optional<double>> extremes_of(const std::vector<ExtremeOf>& all
   return values;
 }
 
-}  // namespace
-
-ObjectiveRun::ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism,
-                           const SimulationSettings& settings, std::function<bool(double t)> progress)
-    : objectives_(std::move(objectives)), mechanism_(mechanism), settings_(settings), progress_(std::move(progress)) {}
-
-SimulationResult ObjectiveRun::run(const Sweep& sweep) const {
-  std::vector<Integral> integrals;
-  std::vector<ExtremeOf> sides;
-  for (std::size_t i = 0; i < objectives_.size(); ++i)
-    for (const ObjectivePart& part : objectives_[i]->parts()) {
-      integrals.push_back({static_cast<Eigen::Index>(i), part});
-      sides.push_back({objectives_[i], part.side});
-    }
-  SimulationResult result = integrated(integrals, sweep);
-  const bool complete =
-      result.ok() || (result.status == SimulationStatus::not_finite && result.last_good_time >= settings_.end_time);
-  if (!complete || in_range(integrals, result.psi)) {
-    if (!result.ok()) return result;
-  } else {
-    const std::vector<std::optional<double>> extremes =
-        extremes_of(sides, mechanism_, settings_, result.steps, progress_);
-    for (std::size_t k = 0; k < integrals.size(); ++k) integrals[k].x0 = extremes[k].value_or(0);
-    result = integrated(integrals, sweep);
-    if (!result.ok()) return result;
-  }
-  const Eigen::VectorXd I = result.psi;
-  const Eigen::MatrixXd I_rho = result.psi_rho;
-  const Eigen::Index count = static_cast<Eigen::Index>(objectives_.size());
-  result.psi.setZero(count);
-  if (I_rho.rows() > 0) result.psi_rho.setZero(count, I_rho.cols());
-  for (std::size_t k = 0; k < integrals.size(); ++k) {
-    const Integral& integral = integrals[k];
-    const Eigen::Index row = static_cast<Eigen::Index>(k);
-    const Jet mean = of(integral).of_integral(I(row), integral.part, integral.x0);
-    if (integral.part.side != 0 && !std::isfinite(mean.value)) {
-      result.status = SimulationStatus::not_finite;
-      result.message = fmt::format(
-          "the steps do not resolve the peaks of objective '{}', whose exponentials integrate to {:.3g}: give it less "
-          "sharpness, or set simulation.integrator.max_step",
-          of(integral).name(), I(row));
-      return result;
-    }
-    result.psi(integral.objective) += integral.part.factor * mean.value;
-    if (I_rho.rows() > 0) result.psi_rho.row(integral.objective) += integral.part.factor * mean.first * I_rho.row(row);
-  }
-  return result;
-}
-
-SimulationResult ObjectiveRun::integrated(const std::vector<Integral>& integrals, const Sweep& sweep) const {
-  std::vector<Cost> costs;
-  for (const Integral& integral : integrals)
-    costs.push_back(of(integral).cost(mechanism_, integral.part, integral.x0, progress_));
-  return sweep(costs);
-}
-
-bool ObjectiveRun::in_range(const std::vector<Integral>& integrals, const Eigen::VectorXd& values) const {
+// Whether the exponentials of smooth extremes stayed in the range of numbers.
+bool in_range(const std::vector<Integral>& integrals, const Eigen::VectorXd& values) {
   constexpr double kSmall = 1e-250, kLarge = 1e250;  // the range of exp and its sums, with room for factors
   for (std::size_t k = 0; k < integrals.size(); ++k) {
     const double I = std::abs(values(static_cast<Eigen::Index>(k)));
@@ -181,21 +132,60 @@ bool ObjectiveRun::in_range(const std::vector<Integral>& integrals, const Eigen:
   return true;
 }
 
-std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
-                                                 const Mechanism& mechanism, const SimulationSettings& settings,
-                                                 const StepSequence& steps,
-                                                 const std::function<bool(double t)>& progress) {
-  std::vector<ExtremeOf> sides;
-  for (const Objective* const objective : objectives)
-    for (const ObjectivePart& part : objective->parts()) sides.push_back({objective, part.side});
-  const std::vector<std::optional<double>> extremes = extremes_of(sides, mechanism, settings, steps, progress);
-  std::vector<std::optional<double>> values(objectives.size());
-  auto extreme = extremes.begin();
-  for (std::size_t i = 0; i < objectives.size(); ++i)
-    for (const ObjectivePart& part : objectives[i]->parts()) {
-      if (*extreme) values[i] = values[i].value_or(0) + part.factor * **extreme;
-      ++extreme;
+}  // namespace
+
+SimulationResult run_objectives(const std::vector<Objective>& objectives, const Mechanism& mechanism,
+                                const SimulationSettings& settings,
+                                const std::function<SimulationResult(std::span<const Cost>)>& sweep,
+                                const std::function<bool(double t)>& progress) {
+  std::vector<Integral> integrals = integrals_of(objectives);
+  const auto costs = [&] {
+    std::vector<Cost> all;
+    for (const Integral& i : integrals) all.push_back(i.objective->cost(mechanism, i.part, i.x0, progress));
+    return all;
+  };
+  SimulationResult result = sweep(costs());
+  const bool complete =
+      result.ok() || (result.status == SimulationStatus::not_finite && result.last_good_time >= settings.end_time);
+  if (complete && !in_range(integrals, result.psi)) {
+    const std::vector<std::optional<double>> extremes =
+        extremes_of(integrals, mechanism, settings, result.steps, progress);
+    for (std::size_t k = 0; k < integrals.size(); ++k) integrals[k].x0 = extremes[k].value_or(0);
+    result = sweep(costs());
+  }
+  if (!result.ok()) return result;
+  const Eigen::VectorXd I = result.psi;
+  const Eigen::MatrixXd I_rho = result.psi_rho;
+  result.psi.setZero(static_cast<Eigen::Index>(objectives.size()));
+  if (I_rho.size() > 0) result.psi_rho.setZero(result.psi.size(), I_rho.cols());
+  Eigen::Index k = 0;
+  for (const auto& [objective, row, part, x0] : integrals) {
+    const Jet mean = objective->of_integral(I(k), part, x0);
+    if (part.side != 0 && !std::isfinite(mean.value)) {
+      result.status = SimulationStatus::not_finite;
+      result.message = fmt::format(
+          "the steps do not resolve the peaks of objective '{}', whose exponentials integrate to {:.3g}: give it less "
+          "sharpness, or set simulation.integrator.max_step",
+          objective->name(), I(k));
+      return result;
     }
+    result.psi(row) += part.factor * mean.value;
+    if (I_rho.size() > 0) result.psi_rho.row(row) += part.factor * mean.first * I_rho.row(k);
+    ++k;
+  }
+  return result;
+}
+
+std::vector<std::optional<double>> true_extremes(const std::vector<Objective>& objectives, const Mechanism& mechanism,
+                                                 const SimulationSettings& settings, const StepSequence& steps,
+                                                 const std::function<bool(double t)>& progress) {
+  const std::vector<Integral> integrals = integrals_of(objectives);
+  const std::vector<std::optional<double>> extremes = extremes_of(integrals, mechanism, settings, steps, progress);
+  std::vector<std::optional<double>> values(objectives.size());
+  for (std::size_t k = 0; k < integrals.size(); ++k) {
+    std::optional<double>& value = values[static_cast<std::size_t>(integrals[k].row)];
+    if (extremes[k]) value = value.value_or(0) + integrals[k].part.factor * *extremes[k];
+  }
   return values;
 }
 

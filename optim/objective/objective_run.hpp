@@ -1,8 +1,9 @@
 // One run of several objectives. It turns the integrals of their costs into psi and its gradient, and finds the true
 // extremes of smooth maxima and minima.
 //
-//   ObjectiveRun objectives({&track, &peak}, mechanism, settings);
-//   SimulationResult r = objectives.run([&](auto costs) { return simulate_adjoint(mechanism, settings, costs); });
+//   SimulationResult r = run_objectives(objectives, mechanism, settings, [&](std::span<const Cost> costs) {
+//     return simulate_adjoint(mechanism, settings, costs);
+//   });
 //   r.psi, r.psi_rho      // of the objectives, without parameters_only
 #pragma once
 
@@ -16,43 +17,20 @@
 
 namespace mbsopt::inline optim {
 
-class ObjectiveRun {
- public:
-  using Sweep = std::function<SimulationResult(std::span<const Cost>)>;
-
-  // progress has the meaning of RunOptions, for the search of true extremes.
-  ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism, const SimulationSettings& settings,
-               std::function<bool(double t)> progress = {});
-
-  // Calls the sweep with the objectives' costs at x0 = 0. If an exponential of a smooth extreme left the range of
-  // numbers, it calls it once more with x0 = the extremes of that run.
-  SimulationResult run(const Sweep& sweep) const;
-
- private:
-  struct Integral {
-    Eigen::Index objective;
-    ObjectivePart part;
-    double x0 = 0;
-  };
-  SimulationResult integrated(const std::vector<Integral>& integrals, const Sweep& sweep) const;
-  bool in_range(const std::vector<Integral>& integrals, const Eigen::VectorXd& values) const;
-  const Objective& of(const Integral& integral) const {
-    return *objectives_[static_cast<std::size_t>(integral.objective)];
-  }
-
-  std::vector<const Objective*> objectives_;
-  const Mechanism mechanism_;
-  SimulationSettings settings_;
-  std::function<bool(double t)> progress_;
-};
+// Calls the sweep with the costs of the objectives that need a simulation, at x0 = 0. If an exponential of a smooth
+// extreme left the range of numbers, it calls it once more with x0 = the extremes of that run. psi and psi_rho have a
+// row per objective, 0 where nothing is simulated. progress has the meaning of RunOptions, for searches beside the run.
+SimulationResult run_objectives(const std::vector<Objective>& objectives, const Mechanism& mechanism,
+                                const SimulationSettings& settings,
+                                const std::function<SimulationResult(std::span<const Cost>)>& sweep,
+                                const std::function<bool(double t)>& progress = {});
 
 // The true extreme of each objective that is one, on given steps. It evaluates the dense output at eight points of each
 // step, at the times of the rows of a trajectory, and at higher tops of parabolas through three of them. If the motion
 // is solved, it halves the brackets of these tops until rtol. So the motion reaches the value. There is none if
 // progress, called after steps as in RunOptions, stops the search.
-std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
-                                                 const Mechanism& mechanism, const SimulationSettings& settings,
-                                                 const StepSequence& steps,
+std::vector<std::optional<double>> true_extremes(const std::vector<Objective>& objectives, const Mechanism& mechanism,
+                                                 const SimulationSettings& settings, const StepSequence& steps,
                                                  const std::function<bool(double t)>& progress = {});
 
 // Sentences on smooth extremes that leave out a peak which the true extreme shows. One of the exponent k that lasts the

@@ -64,31 +64,28 @@ Answer TradeoffRuns::run(const SimulationSettings& given, const RunLimit& limit,
   return run_within(limit, [&](Answer& answer, const std::function<bool(double)>& go_on) {
     const SimulationSettings settings = integrated(given);
     const Eigen::VectorXd rho = parameter_values(scene_);
-    std::vector<const Objective*> simulated;
-    for (const Objective& o : objectives_)
-      if (o.needs_simulation()) simulated.push_back(&o);
     RunOptions options;
     options.frozen = frozen;
     options.progress = go_on;
     const Mechanism mechanism(scene_, rho, no_derivatives(scene_));
-    SimulationResult result = ObjectiveRun(simulated, mechanism, settings, go_on).run([&](std::span<const Cost> costs) {
+    const auto simulated = [&](std::span<const Cost> costs) {
       Sampling sampling;
       if (sampled) {
         answer.motion.times = sample_times(settings, kSamples);
         sampling = record_motion(mechanism, answer.motion);
       }
       return simulate(mechanism, settings, costs, sampling, options);
-    });
+    };
+    SimulationResult result = run_objectives(objectives_, mechanism, settings, simulated, go_on);
     answer.ok = result.ok();
     answer.message = result.message;
     answer.statistics = result.statistics;
     answer.y_initial = std::move(result.y_initial);
     answer.steps = std::move(result.steps);
     if (!answer.ok) return;
-    answer.psi.resize(static_cast<Eigen::Index>(objectives_.size()));
-    Eigen::Index row = 0, k = 0;
-    for (const Objective& o : objectives_)
-      answer.psi(k++) = (o.needs_simulation() ? result.psi(row++) : 0) + o.parameters_only(rho);
+    answer.psi = result.psi;
+    for (std::size_t i = 0; i < objectives_.size(); ++i)
+      answer.psi(static_cast<Eigen::Index>(i)) += objectives_[i].parameters_only(rho);
     answer.ok = answer.psi.allFinite() && answer.motion.states.allFinite();
     if (!answer.ok) answer.message = "an objective or the motion is not finite";
   });

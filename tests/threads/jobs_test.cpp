@@ -6,7 +6,7 @@
 #include "optim/fit/fit_start.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
-#include "optim/objective/case_evaluator.hpp"
+#include "optim/objective/evaluator.hpp"
 #include "tests/optim/fit/windowed_pendulum.hpp"
 #include "tests/optim/five_bar.hpp"
 #include "tests/optim/repetitions.hpp"
@@ -23,8 +23,8 @@ TEST_CASE("load cases give the same bits in any number of threads", "[threads][c
     problem.cases.push_back(c);
   }
   const std::vector<std::string> objectives{problem.objectives.front().name}, variables{"L01", "k2"};
-  CaseEvaluator one(problem, objectives, variables, {}, 1), three(problem, objectives, variables, {}, 3);
-  const CaseEvaluation a = one.gradients(one.start()), b = three.gradients(three.start());
+  Evaluator one(problem, objectives, variables), three(problem, objectives, variables, {.threads = 3});
+  const Evaluation a = one.gradients(one.start()), b = three.gradients(three.start());
   REQUIRE(a.ok);
   CHECK(a.psi(0) != a.psi(1));
   CHECK(a.psi == b.psi);

@@ -98,7 +98,7 @@ TEST_CASE("CVODES and the discrete derivatives agree to 1e-6, whatever the file'
   problem.objectives.push_back(drop);
   const bool fixed = GENERATE(false, true);
   if (fixed) problem.scene.simulation.integrator.type = "rk4", problem.scene.simulation.integrator.step = 0.01;
-  const ContinuousCheck check = check_continuous(problem.scene, objectives_of(problem));
+  const ContinuousCheck check = check_continuous(Evaluator(problem.scene, objectives_of(problem)));
   INFO(check.message);
   REQUIRE(check.ran);
   CHECK(check.entries.size() == 20);
@@ -118,7 +118,7 @@ TEST_CASE("an integral that the discrete steps do not resolve is excused, and se
   Problem problem = five_bar::problem(1e-6);
   problem.scene.simulation.end_time = 1;
   problem.objectives = {sum("edge", "smooth_abs(r2_x, 1e-5)")};
-  const ContinuousCheck check = check_continuous(problem.scene, objectives_of(problem));
+  const ContinuousCheck check = check_continuous(Evaluator(problem.scene, objectives_of(problem)));
   INFO(check.message);
   REQUIRE(check.ran);
   CHECK(check.worst_difference("edge") > 1e-6);
@@ -129,7 +129,7 @@ TEST_CASE("an integral that the discrete steps do not resolve is excused, and se
 TEST_CASE("where CVODES does not get through, nothing is judged, and it is said", "[check]") {
   Problem problem = five_bar::problem(1e-6);
   problem.scene.simulation.integrator.max_steps = 20;
-  const ContinuousCheck check = check_continuous(problem.scene, objectives_of(problem));
+  const ContinuousCheck check = check_continuous(Evaluator(problem.scene, objectives_of(problem)));
   CHECK_FALSE(check.ran);
   CHECK(check.passed());
   CHECK_THAT(check.message, Contains("cvodes_adams") && Contains("cvodes_bdf") && Contains("20 steps"));
@@ -176,7 +176,7 @@ TEST_CASE("derivatives of penalty are compared with CVODES without projection", 
   formulation.type = FormulationType::penalty, formulation.linear_solver = LinearSolver::quasidefinite;
   formulation.alpha = 1e4;
   REQUIRE(formulation.projection == Projection::position_velocity);
-  const ContinuousCheck check = check_continuous(problem.scene, objectives_of(problem));
+  const ContinuousCheck check = check_continuous(Evaluator(problem.scene, objectives_of(problem)));
   INFO(check.message);
   REQUIRE(check.ran);
   INFO(check.worst_difference("motion"));

@@ -227,10 +227,8 @@ TEST_CASE("Hessians of a design are those of its scaled program", "[design_optim
   product.parameters_only = Expression::parse("L01^2*L02");
   problem.objectives.push_back(product);
   problem.design->subject_to = {{"product", {}, 10.0}};
-  CaseEvaluator evaluator(problem, {"motion", "product"}, {"L01", "L02"});
-  const VariableScaling scaling({problem.scene.parameters[0], problem.scene.parameters[1]});
-  DesignProgram program(*problem.design, evaluator, scaling);
-  const Eigen::VectorXd x = scaling.to_x(evaluator.start().head<2>());
+  DesignProgram program(problem);
+  const Eigen::VectorXd x = program.x_start();
   std::vector<Eigen::MatrixXd> H;
   REQUIRE(program.hessians(x, H));
   REQUIRE(H.size() == 2);
@@ -289,19 +287,17 @@ TEST_CASE("Hessians of a design are right where the motion is wild", "[design_op
 #endif
   Problem problem = from_start(0, "exact");
   problem.scene.parameters[0].value = 1.383367, problem.scene.parameters[1].value = 2.137718;
-  CaseEvaluator cases(problem, {"motion"}, {"L01", "L02"});
-  Evaluator& evaluator = cases.of_case(0);
-  const VariableScaling scaling({problem.scene.parameters[0], problem.scene.parameters[1]});
-  DesignProgram program(*problem.design, cases, scaling);
+  DesignProgram program(problem);
+  Evaluator& evaluator = program.evaluator();
   std::vector<Eigen::MatrixXd> H;
-  REQUIRE(program.hessians(scaling.to_x(evaluator.start().head<2>()), H));
+  REQUIRE(program.hessians(program.x_start(), H));
   // Shorter and shorter differences until they agree; over 1e-2 of a length they have the wrong sign.
   HessianOptions long_ladder;
   long_ladder.relative_step = 1e-4, long_ladder.rungs = 16;
   const Hessians found = hessians(evaluator, evaluator.start(), long_ladder);
   REQUIRE(found.ok);
   REQUIRE(found.of[0].relative() < 1e-5);
-  const Eigen::VectorXd s = scaling.rho_x(scaling.to_x(evaluator.start().head<2>()));
+  const Eigen::VectorXd s = program.scaling().rho_x(program.x_start());
   const Eigen::MatrixXd reference = s.asDiagonal() * found.of[0].value * s.asDiagonal();
   CHECK((H[0] - reference).norm() < 1e-3 * reference.norm());
 }

@@ -1,13 +1,12 @@
 // Load cases: each is the problem that a user would write by hand; threads change nothing; the smooth maximum over
 // cases.
-#include "optim/objective/case_evaluator.hpp"
-
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "optim/check/gradient_check.hpp"
 #include "optim/design/design.hpp"
 #include "optim/objective/case_objective.hpp"
+#include "optim/objective/evaluator.hpp"
 #include "optim/problem/load_cases.hpp"
 #include "tests/core/mechanism/one_coordinate.hpp"
 
@@ -41,8 +40,9 @@ TEST_CASE("values and gradients in cases are those of the closed form, by the ch
   EvaluatorOptions options;
   options.method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint, GradientMethod::differences);
   const double accuracy = options.method == GradientMethod::differences ? 1e-6 : 1e-9;
-  CaseEvaluator evaluator(loaded_swing(), {"end"}, {"k", "a", "b"}, options, 2);
-  const CaseEvaluation& e = evaluator.gradients(evaluator.start());
+  options.threads = 2;
+  Evaluator evaluator(loaded_swing(), {"end"}, {"k", "a", "b"}, options);
+  const Evaluation e = evaluator.gradients(evaluator.start());
   REQUIRE(e.ok);
   CHECK(e.psi(0) == Approx(end_of(6.1, 0.3, 1)).epsilon(1e-9));
   CHECK(e.psi(1) == Approx(end_of(4, 0.1, 2)).epsilon(1e-9));
@@ -128,14 +128,14 @@ TEST_CASE("a design over cases: sum and maximum have their closed optimum, limit
 
 TEST_CASE("what is said of a case names parameters as the problem does", "[cases]") {
   Problem problem = loaded_swing();
-  CaseEvaluator evaluator(problem, {"end"}, {"k", "a", "b"});
+  Evaluator evaluator(problem, {"end"}, {"k", "a", "b"});
   CHECK(evaluator.in_case(0, "k_of_problem moves a jump") == "k moves a jump (stiff)");
   problem.scene.forces.clear();
   PointForce pull;
   pull.body = "mass", pull.components = {f("1/(t - 0.5)"), f("0"), f("0")};
   problem.scene.forces.push_back({"pull", pull});
-  CaseEvaluator failing(problem, {"end"}, {"k", "a", "b"});
-  const CaseEvaluation& e = failing.values(failing.start());
+  Evaluator failing(problem, {"end"}, {"k", "a", "b"});
+  const Evaluation e = failing.values(failing.start());
   CHECK_FALSE(e.ok);  // no maximum over the cases that did not fail
   CHECK(e.message.starts_with("case 'stiff': "));
 }

@@ -108,15 +108,12 @@ TEST_CASE("residuals of free timing: the gradient is that of the sum, the instan
   problem.design.emplace();
   problem.design->minimize = "path", problem.design->variables = {"r", "c"};
   problem.design->optimizer.type = OptimizerSpec::kLeastSquares;
-  CaseEvaluator evaluator(problem, {"path"}, problem.design->variables);
-  std::vector<Parameter> designed{problem.scene.parameters[0], problem.scene.parameters[1]};
-  const VariableScaling scaling(designed);
-  DesignProgram program(*problem.design, evaluator, scaling);
+  DesignProgram program(problem);
   VectorXd rho(2);
   rho << 2.0, 0.5;
-  const VectorXd x = scaling.to_x(rho);
+  const VectorXd x = program.scaling().to_x(rho);
   program.start_from(x);
-  TrackedSquares squares(program, evaluator);
+  TrackedSquares squares(program);
   LeastSquaresPoint point;
   point.z.setZero(squares.size), point.z_x.setZero(squares.size, 2);
   squares.evaluate(x, point);
@@ -128,7 +125,7 @@ TEST_CASE("residuals of free timing: the gradient is that of the sum, the instan
   CHECK(point.z.squaredNorm() == Approx(nlp.f).epsilon(1e-12));
   CHECK((2 * point.z_x.transpose() * point.z - nlp.f_x).norm() < 1e-9 * nlp.f_x.norm());
   // With r the tip moves along the radius: nothing of it is projected out at the three points, w = 3.
-  CHECK(point.z_x.col(0).norm() == Approx(scaling.rho_x(x)(0) * std::sqrt(3 * 3.0)).epsilon(1e-9));
+  CHECK(point.z_x.col(0).norm() == Approx(program.scaling().rho_x(x)(0) * std::sqrt(3 * 3.0)).epsilon(1e-9));
 }
 
 namespace {

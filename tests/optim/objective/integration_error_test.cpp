@@ -9,10 +9,9 @@ using namespace mbsopt;
 
 TEST_CASE("five-bar: the estimated integration error is of the size of the true one", "[integration_error]") {
   const Problem problem = five_bar::problem(GENERATE(1e-5, 1e-7));
-  const std::vector<Objective> objectives = objectives_of(problem);
-  Evaluator evaluator(problem.scene, objectives);
-  const Evaluation& base = evaluator.gradients(evaluator.start());
-  const IntegrationError error = integration_error(problem.scene, objectives, base.psi, base.psi_rho);
+  Evaluator evaluator(problem.scene, objectives_of(problem));
+  const Evaluation base = evaluator.gradients(evaluator.start());
+  const IntegrationError error = integration_error(evaluator, base);
   CHECK(error.simulations == 1);
   CHECK(std::abs(base.psi(0) - five_bar::kPsi) < 3 * error.psi(0));
   CHECK(error.psi(0) < 1e-2 * five_bar::kPsi);
@@ -25,8 +24,10 @@ TEST_CASE("five-bar: the estimated integration error is of the size of the true 
 TEST_CASE("with fixed steps there is no error that jumps from run to run", "[integration_error]") {
   Problem problem = five_bar::problem(1e-5);
   problem.scene.simulation.integrator.step = 0.01;
-  const IntegrationError error =
-      integration_error(problem.scene, objectives_of(problem), Eigen::VectorXd::Ones(1), Eigen::MatrixXd::Ones(1, 10));
+  const Evaluator evaluator(problem.scene, objectives_of(problem));
+  Evaluation base;
+  base.psi.setOnes(1), base.psi_rho.setOnes(1, 10);
+  const IntegrationError error = integration_error(evaluator, base);
   CHECK(error.psi(0) == 0);
   CHECK(error.psi_rho.norm() == 0);
   CHECK(error.simulations == 0);
@@ -34,16 +35,11 @@ TEST_CASE("with fixed steps there is no error that jumps from run to run", "[int
 
 namespace {
 
-Evaluation gradients_of(const Problem& problem) {
-  Evaluator evaluator(problem.scene, objectives_of(problem));
-  return evaluator.gradients(evaluator.start());
-}
-
-std::vector<std::string> doubts(const Problem& problem, const Evaluation& e) {
-  const std::vector<Objective> objectives = objectives_of(problem);
-  return unresolved_gradients(problem.scene, objectives, e.psi, e.psi_rho,
-                              integration_error(problem.scene, objectives, e.psi, e.psi_rho, {.fixed_steps = true}));
-}
+struct Gradients {
+  Evaluator evaluator;
+  Evaluation e = evaluator.gradients(evaluator.start());
+  explicit Gradients(const Problem& problem) : evaluator(problem.scene, objectives_of(problem)) {}
+};
 
 // A body falls along a parabola, which dopri5 meets exactly: tolerances choose no steps, and an integral over them has
 // the error of the longest ones.
@@ -69,18 +65,16 @@ Problem falling(const std::string& running) {
 // The integral of exp(-((t - 0.5)/w)^2) from 0 to 1 is w sqrt(pi) erf(1/(2w)).
 TEST_CASE("integrals of a motion that any steps meet have an error that shows", "[integration_error]") {
   const Problem problem = falling("p*exp(-((t - 0.5)/0.3)^2)");
-  const std::vector<Objective> objectives = objectives_of(problem);
-  const Evaluation e = gradients_of(problem);
+  const auto [evaluator, e] = Gradients(problem);
   INFO(e.message);
   REQUIRE(e.ok);
   const double exact = 0.3 * std::sqrt(std::acos(-1.0)) * std::erf(0.5 / 0.3), off = std::abs(e.psi_rho(0, 0) - exact);
   INFO(e.statistics.steps << " steps, off by " << off);
   CHECK(off > 1e-4 * exact);
-  CHECK(may_be_unresolved(problem.scene, objectives, e));
-  const IntegrationError error =
-      integration_error(problem.scene, objectives, e.psi, e.psi_rho, {.steps = e.statistics.steps});
+  CHECK(may_be_unresolved(evaluator, e));
+  const IntegrationError error = integration_error(evaluator, e);
   CHECK(error.psi_rho(0, 0) > 0.3 * off);
-  CHECK(unresolved_gradients(problem.scene, objectives, e.psi, e.psi_rho, error).size() == 1);
+  CHECK(unresolved_gradients(evaluator, e, error).size() == 1);
 }
 
 // The integral of L01 exp(-((t - 0.5)/w)^2) over the real axis is L01 w sqrt(pi).
@@ -95,24 +89,24 @@ TEST_CASE("a gradient that the steps do not resolve is doubted, one that they re
   }
   const double width = GENERATE(1e-3, 0.1);
   problem.objectives[0].running = Expression::parse("L01*exp(-((t - 0.5)/" + std::to_string(width) + ")^2)");
-  const Evaluation e = gradients_of(problem);
+  const auto [evaluator, e] = Gradients(problem);
   REQUIRE(e.ok);
   const double exact = width * std::sqrt(std::acos(-1.0));
-  const std::vector<std::string> found = doubts(problem, e);
+  const std::vector<std::string> found =
+      unresolved_gradients(evaluator, e, integration_error(evaluator, e, GradientMethod::automatic, true));
   INFO("width " << width << ": off by " << e.psi_rho(0, 0) / exact - 1);
   CHECK((std::abs(e.psi_rho(0, 0) - exact) > 1e-4 * exact) == (width < 0.01));
-  CHECK(may_be_unresolved(problem.scene, objectives_of(problem), e) == (width < 0.01));
+  CHECK(may_be_unresolved(evaluator, e) == (width < 0.01));
   REQUIRE(found.size() == (width < 0.01 ? 1U : 0U));
   if (width < 0.01) CHECK(found[0].find("gradient of objective 'motion'") != std::string::npos);
 }
 
 TEST_CASE("a motion that magnifies what changes at its start asks for an estimate", "[integration_error]") {
   const Problem problem = five_bar::problem(1e-8);
-  const std::vector<Objective> objectives = objectives_of(problem);
-  Evaluation e = gradients_of(problem);
-  CHECK_FALSE(may_be_unresolved(problem.scene, objectives, e));
+  auto [evaluator, e] = Gradients(problem);
+  CHECK_FALSE(may_be_unresolved(evaluator, e));
   e.psi_rho *= 1e6;
-  CHECK(may_be_unresolved(problem.scene, objectives, e));
+  CHECK(may_be_unresolved(evaluator, e));
 }
 
 TEST_CASE("an rms that is hardly larger than the tolerances asks for an estimate", "[integration_error]") {
@@ -121,7 +115,8 @@ TEST_CASE("an rms that is hardly larger than the tolerances asks for an estimate
   const bool small = GENERATE(false, true);
   problem.objectives[0].running.reset();
   problem.objectives[0].mean("rms_of") = Expression::parse(small ? "1e-9*L01" : "L01");
-  CHECK(may_be_unresolved(problem.scene, objectives_of(problem), gradients_of(problem)) == small);
+  const auto [evaluator, e] = Gradients(problem);
+  CHECK(may_be_unresolved(evaluator, e) == small);
 }
 
 TEST_CASE("a tenth of the errors: rtol by 10, a largest step by 10^(1/order)", "[integration_error]") {

@@ -223,6 +223,6 @@ TEST_CASE("the search of a true extreme stops when it is asked to", "[objective]
   const StepSequence steps = simulate(mechanism, settings).steps;
   int looks = 0;
   const auto stop = [&](double) { return ++looks < 3; };
-  CHECK_FALSE(true_extremes({&objectives[0]}, mechanism, settings, steps, stop)[0]);
+  CHECK_FALSE(true_extremes(objectives, mechanism, settings, steps, stop)[0]);
   CHECK(looks == 3);
 }

@@ -74,12 +74,12 @@ TEST_CASE("Gauss-Newton's matrix of a track is that of its residuals", "[objecti
   const Problem problem = slide();
   Evaluator evaluator(problem.scene, objectives_of(problem));
   const Evaluation e = evaluator.gradients(evaluator.start());
-  const GaussNewton found = gauss_newton(evaluator, e);
+  const Hessians found = gauss_newton(evaluator, e);
   INFO(found.message);
   REQUIRE(found.ok);
   double expected = 0;
   for (const double t : {0.2, 0.5, 1.0}) expected += 2 * 4 * std::pow(t * t / 2, 2);
-  CHECK(found.of[0](0, 0) == Approx(expected));
+  CHECK(found.of[0].value(0, 0) == Approx(expected));
 }
 
 TEST_CASE("rows of a track outside the run are named", "[objective]") {
