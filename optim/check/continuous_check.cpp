@@ -38,47 +38,39 @@ class ContinuousComparison {
     }
     const GradientCost cost = gradient_cost(evaluator_.variables().size(), count);
     forward_ = cost.tlm <= cost.adjoint;
-    const std::optional<MatrixXd> continuous = by_cvodes();
-    if (!continuous) return std::move(result_);
-    const std::optional<MatrixXd> discrete = by_steps(result_.rtol);
-    if (!discrete) return std::move(result_);
+    Evaluation continuous;
+    for (const char* const type : {"cvodes_adams", "cvodes_bdf"}) {
+      result_.integrator = type;
+      if (stiff_ && result_.integrator == "cvodes_adams") continue;
+      continuous = by_cvodes(result_.rtol);
+      if (continuous.ok) break;
+      result_.message += fmt::format("{}{}: {}", result_.message.empty() ? "" : "; ", type, continuous.message);
+    }
+    if (!continuous.ok) return std::move(result_);
+    result_.message.clear();
+    const Evaluation discrete = by_steps(result_.rtol);
+    if (!discrete.ok) {
+      result_.message = fmt::format("{} at rtol {:g}: {}", result_.discrete, result_.rtol, discrete.message);
+      return std::move(result_);
+    }
     result_.ran = true;
-    result_.psi_rho = *continuous;
-    compare(*continuous, *discrete);
+    compare(continuous, discrete);
     return std::move(result_);
   }
 
  private:
-  // Returns the derivatives by Adams' method, or by BDF if stiffness stops Adams' method.
-  std::optional<MatrixXd> by_cvodes() {
-    std::vector<std::string> types{"cvodes_adams", "cvodes_bdf"};
-    if (stiff_) types.erase(types.begin());
-    std::string message;
-    for (const std::string& type : types) {
-      result_.integrator = type;
-      const std::optional<MatrixXd> psi_rho = gradients(type, result_.rtol, method(), &message);
-      if (psi_rho) {
-        result_.message.clear();
-        return psi_rho;
-      }
-      result_.message += fmt::format("{}{}: {}", result_.message.empty() ? "" : "; ", type, message);
-    }
-    return std::nullopt;
+  Evaluation by_cvodes(double rtol) {
+    const GradientMethod method = forward_ ? GradientMethod::cvodes_forward : GradientMethod::cvodes_adjoint;
+    result_.method = to_string(method);
+    Evaluation e = gradients(result_.integrator, rtol, method);
+    result_.wall_seconds = e.wall_seconds;
+    return e;
   }
-  std::optional<MatrixXd> by_steps(double rtol) {
-    std::string message;
-    const GradientMethod discrete = forward_ ? GradientMethod::tlm : GradientMethod::adjoint;
-    std::optional<MatrixXd> psi_rho = gradients(result_.discrete, rtol, discrete, &message);
-    if (!psi_rho) result_.message = fmt::format("{} at rtol {:g}: {}", result_.discrete, rtol, message);
-    return psi_rho;
-  }
-  GradientMethod method() {
-    const GradientMethod m = forward_ ? GradientMethod::cvodes_forward : GradientMethod::cvodes_adjoint;
-    result_.method = to_string(m);
-    return m;
+  Evaluation by_steps(double rtol) {
+    return gradients(result_.discrete, rtol, forward_ ? GradientMethod::tlm : GradientMethod::adjoint);
   }
 
-  std::optional<MatrixXd> gradients(const std::string& type, double rtol, GradientMethod by, std::string* message) {
+  Evaluation gradients(const std::string& type, double rtol, GradientMethod by) {
     constexpr long kManyTimes = 200, kAtLeast = 50'000;
     Scene scene = scene_;
     // CVODES has no projection, and the projection of a penalty formulation has a motion of its own. So neither side
@@ -93,42 +85,31 @@ class ContinuousComparison {
     const long steps = is_cvodes(scene_.simulation.integrator.type) ? 0 : options_.typical_steps;
     scene = with_errors_times(rtol / s.rtol, std::move(scene), steps);
     s.max_steps = std::min(s.max_steps, std::max(kAtLeast, kManyTimes * options_.typical_steps));
-    const Evaluation e = evaluator_.in(std::move(scene), by).gradients(evaluator_.start());
+    Evaluation e = evaluator_.in(std::move(scene), by).gradients(evaluator_.start());
     result_.simulations += e.simulations;
-    if (is_cvodes(type)) result_.wall_seconds = e.wall_seconds;
-    *message = e.message;
-    if (!e.ok) return std::nullopt;
-    psi_ = e.psi;
-    return e.psi_rho;
+    return e;
   }
 
   // If the two differ, a second pair of runs at ten times tighter tolerances decides (looser ones if those are out of
   // reach). Its change is the integrators' error.
-  void compare(const MatrixXd& continuous, const MatrixXd& discrete) {
-    set_entries(continuous, discrete, MatrixXd::Zero(continuous.rows(), continuous.cols()));
+  void compare(const Evaluation& continuous, const Evaluation& discrete) {
+    set_entries(continuous.psi_rho, discrete, MatrixXd::Zero(continuous.psi_rho.rows(), continuous.psi_rho.cols()));
     if (result_.passed()) return;
     constexpr double kTightest = 1e-12;  // rounding starves the step-size control beyond
     const double seconds = result_.wall_seconds;
     const bool tighter = result_.rtol > 10 * kTightest;
     const double rtol = result_.rtol * (tighter ? 0.1 : 10);
-    std::string message;
-    const std::optional<MatrixXd> c = gradients(result_.integrator, rtol, method(), &message), d = by_steps(rtol);
-    if (!c || !d) {
-      result_.wall_seconds = seconds;
-      result_.message.clear();
-      return;
-    }
-    const MatrixXd error = (*c - continuous).cwiseAbs() + (*d - discrete).cwiseAbs();
-    if (tighter) {
-      result_.psi_rho = *c;
-      result_.rtol = rtol;
-    } else {
-      result_.wall_seconds = seconds;
-    }
-    set_entries(tighter ? *c : continuous, tighter ? *d : discrete, error);
+    const Evaluation c = by_cvodes(rtol), d = c.ok ? by_steps(rtol) : Evaluation();
+    if (!tighter || !d.ok) result_.wall_seconds = seconds;
+    if (!d.ok) return;
+    const MatrixXd error = (c.psi_rho - continuous.psi_rho).cwiseAbs() + (d.psi_rho - discrete.psi_rho).cwiseAbs();
+    if (tighter) result_.rtol = rtol;
+    set_entries(tighter ? c.psi_rho : continuous.psi_rho, tighter ? d : discrete, error);
   }
 
-  void set_entries(const MatrixXd& continuous, const MatrixXd& discrete, const MatrixXd& error) {
+  void set_entries(const MatrixXd& continuous, const Evaluation& at, const MatrixXd& error) {
+    const MatrixXd& discrete = at.psi_rho;
+    result_.psi_rho = continuous;
     result_.entries.clear();
     const Eigen::VectorXd size = evaluator_.sizes(evaluator_.start());
     for (Index i = 0; i < discrete.rows(); ++i) {
@@ -145,7 +126,7 @@ class ContinuousComparison {
         // For the integrators an objective below atol is zero. A parameter has no effect if a change by its own size
         // changes the objective by less than its error.
         const double atol = scene_.simulation.integrator.atol * result_.rtol / scene_.simulation.integrator.rtol;
-        const double psi = std::abs(psi_(i)), nothing = (psi < atol ? atol : result_.rtol * psi) / size(k);
+        const double psi = std::abs(at.psi(i)), nothing = (psi < atol ? atol : result_.rtol * psi) / size(k);
         e.verdict = verdict_of(e.continuous, error(i, k) + nothing, e.discrete, entry, options_.threshold);
         result_.entries.push_back(std::move(e));
       }
@@ -156,8 +137,7 @@ class ContinuousComparison {
   const Scene& scene_;
   const std::vector<Objective>& objectives_;
   const ContinuousCheckOptions& options_;
-  Eigen::VectorXd psi_;  // of the last run
-  bool stiff_ = false;   // CVODES: by BDF
+  bool stiff_ = false;  // CVODES: by BDF
   bool forward_ = true;
   ContinuousCheck result_;
 };
