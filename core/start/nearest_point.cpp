@@ -34,7 +34,7 @@ class NearestPointSearch {
 
   NearestPoint run() {
     constexpr int kRestorations = 3;
-    if (guess_is_it() || newton_of_determined()) return result_;
+    if (guess_is_it()) return result_;
     move(x_guess_);
     for (int restorations = 0; !iterate(); ++restorations) {
       if (restorations < kRestorations && restore()) continue;
@@ -54,86 +54,73 @@ class NearestPointSearch {
     const VectorXd x = equations_.retracted(x_guess_), F = equations_.values(x);
     if (!(largest(x - x_guess_) <= 4 * kEpsilon)) return false;  // only unit vectors are retracted
     if (!(F.cwiseAbs().array() <= 4 * kEpsilon * equations_.magnitudes(x).array()).all()) return false;
-    result_.x = x, result_.F = F, result_.nu = VectorXd::Zero(F.size());
-    result_.status = NearestPointStatus::found;
-    result_.linearised = false;
+    settle_without_multipliers(x, F);
     equations_.accept(x);
     return true;
   }
+  void settle_without_multipliers(const VectorXd& x, const VectorXd& F) {
+    result_.x = x, result_.F = F, result_.nu = VectorXd::Zero(F.size());
+    result_.status = NearestPointStatus::found;
+    result_.linearised = false;
+  }
 
-  // The Newton step of equations that leave no freedom. It uses the normal equations; the next step restores their lost
+  // The step of equations that leave no freedom. It uses the normal equations; the next step restores their lost
   // digits. It is empty if these are not positive definite to kDigits.
-  VectorXd determined_step(const MatrixXd& J) const {
+  VectorXd determined_step(const UnitRows& rows, const VectorXd& sizes) const {
     constexpr double kDigits = 1e-8;  // of the pivots, squares of those of J
-    if (J.rows() < J.cols()) return {};
-    const VectorXd scale = J.rowwise().norm().unaryExpr([](double norm) { return norm > 0 ? 1 / norm : 1.0; });
-    const MatrixXd A = scale.asDiagonal() * J;
-    return definite_solve(A.transpose() * A, -(A.transpose() * scale.cwiseProduct(result_.F)), kDigits);
+    const MatrixXd& A = rows.J;       // J in units of the sizes
+    if (A.rows() < A.cols()) return {};
+    const VectorXd step =
+        definite_solve(A.transpose() * A, -(A.transpose() * rows.scale.cwiseProduct(result_.F)), kDigits);
+    return step.size() > 0 ? VectorXd(sizes.cwiseProduct(step)) : step;
   }
 
-  // Does the same as iterate() for equations that leave no freedom. Returns false if they leave some, or if it does not
-  // converge.
-  bool newton_of_determined() {
-    constexpr int kMost = 20;        // quadratic convergence takes far fewer
-    constexpr double kClose = 1e-8;  // of each unknown's size: its square, the error left, is rounding
-    for (int k = 0; k < kMost; ++k, ++result_.iterations) {
-      result_.F = equations_.values(result_.x);
-      if (!result_.F.allFinite()) return false;
-      const MatrixXd J = equations_.jacobian(result_.x);
-      const VectorXd step = determined_step(J);
-      if (step.size() == 0) return false;
-      const Eigen::ArrayXd close = (kClose * equations_.sizes(J)).cwiseMax(4 * kEpsilon * result_.x.cwiseAbs());
-      const bool last = (step.array().abs() <= close).all();
-      move(result_.x + equations_.step_fraction(step) * step);
-      if (!last) continue;
-      result_.F = equations_.values(result_.x);
-      if (!satisfied()) continue;
-      result_.nu = VectorXd::Zero(result_.F.size());
-      result_.status = NearestPointStatus::found;
-      result_.determined = true, result_.linearised = false;
-      return true;
-    }
-    return false;
-  }
-
-  // Takes Gauss-Newton steps, then Newton steps to the rounding of each unknown. If steps do not become shorter, only a
-  // part of those along the equations is taken, from beside the point: it may be one of symmetry, which no step leaves.
-  // Returns false if the equations do not come closer either.
+  // Takes Gauss-Newton steps, then Newton steps to the rounding of each unknown. Equations that leave no freedom need
+  // no decomposition, and both steps are the same. If steps do not become shorter, only a part of those along the
+  // equations is taken, from beside the point: it may be one of symmetry, which no step leaves. Returns false if the
+  // equations do not come closer either.
   bool iterate() {
     constexpr double kNear = 0.05;    // Gauss-Newton steps below it, per unit of x, may be Newton's instead
     constexpr double kConvex = 1e-3;  // least eigenvalue of Z'HZ at which they are
     constexpr double kStrict = 1e-9;  // the same of a minimum: the nearest point moves at most 1e9 times as far
     constexpr double kFlat = 1e-11;   // steps below it, relative to each unknown, may consist of rounding
+    constexpr double kClose = 1e-8;   // of each unknown's size: the square of a step, the error left, is rounding
     constexpr int kPatience = 30;     // steps without a shorter one: it circles
     constexpr double kBeside = 1e-3;  // of the sizes
     double shortest = kInfinity, closest = kInfinity, closest_before = kInfinity, last = kInfinity, part = 1;
     const int end = result_.iterations + most_;
     for (int waited = 0; result_.iterations < end; ++result_.iterations) {
-      linearise();
+      result_.F = equations_.values(result_.x);
       if (!result_.F.allFinite()) return true;
+      const MatrixXd J = equations_.jacobian(result_.x);
+      const VectorXd sizes = equations_.sizes(J), away = x_guess_ - result_.x;
+      const UnitRows rows(J * sizes.asDiagonal());
+      VectorXd step;
+      if (!decomposes_) step = determined_step(rows, sizes);
+      decomposes_ = step.size() == 0;
+      if (decomposes_) result_.linearisation = NearestPointLinearisation(J, sizes);
       const NearestPointLinearisation& at = result_.linearisation;
-      const VectorXd away = x_guess_ - result_.x;
       const auto along = [&](const VectorXd& x) {
         return VectorXd(at.null_space() * (at.null_space().transpose() * x));
       };
-      VectorXd step = at.pseudo_inverse_times(-result_.F) + part * along(away);
+      if (decomposes_) step = at.pseudo_inverse_times(-result_.F) + part * along(away);
       const double length = largest(step);
       if (!satisfied() && length <= 2 * kEpsilon * size()) return false;  // nothing shows a direction
-      closest = std::min(closest, at.row_scale().cwiseProduct(result_.F).norm());
+      closest = std::min(closest, rows.scale.cwiseProduct(result_.F).norm());
       if (length < 0.9 * shortest) {
         shortest = length, waited = 0;
       } else if (++waited == kPatience) {
         if (!(closest < 0.7 * closest_before)) return false;
         closest_before = closest, shortest = kInfinity, waited = 0, part /= 4;
-        move(result_.x + along(kBeside * at.sizes()));
+        if (decomposes_) move(result_.x + along(kBeside * sizes));
         continue;
       }
-      if (length < kNear * part * size()) {
+      if (decomposes_ && length < kNear * part * size()) {
         result_.nu = at.multipliers_at(away);
         result_.linearisation.set_hessian(hessian_at(equations_, result_));
         const VectorXd& lambda = at.reduced_eigenvalues();
         if (lambda.size() == 0 || lambda(0) > kConvex) step = at.solve(-result_.F, away);
-        const double relative = largest(step.cwiseQuotient(at.sizes() + VectorXd(result_.x.cwiseAbs())));
+        const double relative = largest(step.cwiseQuotient(sizes + VectorXd(result_.x.cwiseAbs())));
         if (satisfied() && (relative <= 2 * kEpsilon || (relative < kFlat && !(relative < 0.5 * last)))) {
           const bool is_minimum = lambda.size() == 0 || lambda(0) > kStrict;
           result_.status = is_minimum ? NearestPointStatus::found : NearestPointStatus::undetermined;
@@ -141,7 +128,14 @@ class NearestPointSearch {
         }
         last = relative;
       }
+      const Eigen::ArrayXd close = (kClose * sizes).cwiseMax(4 * kEpsilon * result_.x.cwiseAbs());
       move(result_.x + equations_.step_fraction(step) * step);
+      if (decomposes_ || (step.array().abs() > close).any()) continue;
+      result_.F = equations_.values(result_.x);
+      if (!satisfied()) continue;
+      settle_without_multipliers(result_.x, result_.F);
+      result_.determined = true;
+      return true;
     }
     return true;
   }
@@ -181,11 +175,6 @@ class NearestPointSearch {
   bool is_closed() const { return largest(result_.F) < 1e-9 * size(); }
   double size() const { return 1 + largest(result_.x); }
 
-  void linearise() {
-    result_.F = equations_.values(result_.x);
-    const MatrixXd J = equations_.jacobian(result_.x);
-    result_.linearisation = NearestPointLinearisation(J, equations_.sizes(J));
-  }
   void move(const VectorXd& x) {
     result_.x = equations_.retracted(x);
     equations_.accept(result_.x);
@@ -193,7 +182,8 @@ class NearestPointSearch {
 
   NearestPointEquations& equations_;
   const VectorXd x_guess_;
-  const int most_;  // iterations of each method
+  const int most_;           // iterations of each method
+  bool decomposes_ = false;  // J: the normal equations do not determine a step
   NearestPoint result_;
 };
 

@@ -48,12 +48,26 @@ MatrixXd orthonormal_null_space(const MatrixXd& J, const OrthogonalDecomposition
   return Z;
 }
 
-// Rows of J and unknowns that their entries join.
-struct Part {
-  std::vector<Eigen::Index> rows, unknowns;
-};
+// Does the same part by part, so that each column is exactly zero outside its part. Rounding there would be multiplied
+// by the second derivatives of another part's equations, which in a mechanism of micrometres are 1e12 times larger.
+MatrixXd null_space_by_parts(const MatrixXd& J, const OrthogonalDecomposition& J_transposed, const VectorXd& sizes) {
+  const std::vector<JoinedPart> parts = joined_parts(J);
+  if (parts.size() == 1) return orthonormal_null_space(J, J_transposed, sizes);
+  MatrixXd Z = MatrixXd::Zero(J.cols(), J.cols());
+  Eigen::Index columns = 0;
+  for (const JoinedPart& part : parts) {
+    const MatrixXd own = J(part.rows, part.unknowns);
+    const OrthogonalDecomposition decomposed(own.transpose(), NearestPointLinearisation::kRankThreshold);
+    const MatrixXd free = orthonormal_null_space(own, decomposed, sizes(part.unknowns));
+    Z(part.unknowns, Eigen::seqN(columns, free.cols())) = free;
+    columns += free.cols();
+  }
+  return Z.leftCols(columns);
+}
 
-std::vector<Part> parts_of(const MatrixXd& J) {
+}  // namespace
+
+std::vector<JoinedPart> joined_parts(const MatrixXd& J) {
   std::vector<std::size_t> joined(static_cast<std::size_t>(J.cols()));
   std::iota(joined.begin(), joined.end(), std::size_t{0});
   const auto root = [&](std::size_t k) {
@@ -69,44 +83,21 @@ std::vector<Part> parts_of(const MatrixXd& J) {
       first = first == joined.size() ? other : joined[other] = root(first);
     }
   }
-  std::vector<Part> of_root(joined.size()), parts;
+  std::vector<JoinedPart> of_root(joined.size()), parts;
   for (std::size_t k = 0; k < joined.size(); ++k) of_root[root(k)].unknowns.push_back(static_cast<Eigen::Index>(k));
   for (std::size_t i = 0; i < of_row.size(); ++i) {
     if (of_row[i] < joined.size()) of_root[root(of_row[i])].rows.push_back(static_cast<Eigen::Index>(i));
   }
-  std::ranges::copy_if(of_root, std::back_inserter(parts), [](const Part& part) { return !part.unknowns.empty(); });
+  std::ranges::copy_if(of_root, std::back_inserter(parts),
+                       [](const JoinedPart& part) { return !part.unknowns.empty(); });
   return parts;
 }
 
-// Does the same part by part, so that each column is exactly zero outside its part. Rounding there would be multiplied
-// by the second derivatives of another part's equations, which in a mechanism of micrometres are 1e12 times larger.
-MatrixXd null_space_by_parts(const MatrixXd& J, const OrthogonalDecomposition& J_transposed, const VectorXd& sizes) {
-  const std::vector<Part> parts = parts_of(J);
-  if (parts.size() == 1) return orthonormal_null_space(J, J_transposed, sizes);
-  MatrixXd Z = MatrixXd::Zero(J.cols(), J.cols());
-  Eigen::Index columns = 0;
-  for (const Part& part : parts) {
-    const MatrixXd own = J(part.rows, part.unknowns);
-    const OrthogonalDecomposition decomposed(own.transpose(), NearestPointLinearisation::kRankThreshold);
-    const MatrixXd free = orthonormal_null_space(own, decomposed, sizes(part.unknowns));
-    Z(part.unknowns, Eigen::seqN(columns, free.cols())) = free;
-    columns += free.cols();
-  }
-  return Z.leftCols(columns);
-}
-
-}  // namespace
-
-NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const VectorXd& sizes)
-    : J_(J), scale_(J.rows()), sizes_(sizes) {
-  const MatrixXd sized = J * sizes.asDiagonal();
-  for (Eigen::Index i = 0; i < J.rows(); ++i) {
-    const double norm = sized.row(i).norm();
-    scale_(i) = norm > 0 ? 1 / norm : 1.0;
-  }
-  const MatrixXd scaled = scale_.asDiagonal() * sized;
-  J_transposed_ = OrthogonalDecomposition(scaled.transpose(), kRankThreshold);
-  Z_ = null_space_by_parts(scaled, J_transposed_, sizes);
+NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const VectorXd& sizes) : J_(J), sizes_(sizes) {
+  const UnitRows rows(J * sizes.asDiagonal());
+  scale_ = rows.scale;
+  J_transposed_ = OrthogonalDecomposition(rows.J.transpose(), kRankThreshold);
+  Z_ = null_space_by_parts(rows.J, J_transposed_, sizes);
 }
 
 MatrixXd NearestPointLinearisation::multipliers(const MatrixXd& g) const {

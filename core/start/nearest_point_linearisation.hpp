@@ -10,15 +10,23 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "core/linear/dense.hpp"
+#include "core/start/unit_rows.hpp"
 
 namespace mbsopt {
+
+// Rows of a matrix and unknowns that their entries join.
+struct JoinedPart {
+  std::vector<Eigen::Index> rows, unknowns;
+};
+std::vector<JoinedPart> joined_parts(const Eigen::MatrixXd& A);
 
 // J decomposed at one point, and the solution of the linear system.
 class NearestPointLinearisation {
  public:
-  static constexpr double kRankThreshold = 1e-8;  // relative, rows of J scaled to unit length
+  static constexpr double kRankThreshold = UnitRows::kRankThreshold;
 
   NearestPointLinearisation() = default;
   NearestPointLinearisation(const Eigen::MatrixXd& J, const Eigen::VectorXd& sizes);
