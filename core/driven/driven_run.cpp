@@ -277,25 +277,19 @@ double DrivenRun::value_of(const DrivenTerm& term, const StatePoint& at) {
 }
 
 SingularPosition& DrivenRun::singular_at(double t) {
-  std::vector<SingularPosition>& known = result_.statistics.singular;
-  const SingularWindow& w = *window_at(t);
-  const auto same = std::ranges::find(known, w.t, &SingularPosition::t);
-  if (same != known.end()) return *same;
-  known.push_back(singular_position(mechanism_, w.t, w.state_at(w.t).y, w.half));
-  return known.back();
+  return singular_position(mechanism_, *window_at(t), result_.statistics.singular);
 }
 
 // Notes that a state which is asked for cannot be continued smoothly past a singular position.
 void DrivenRun::note_uncertain() {
   std::vector<SingularPosition>& known = result_.statistics.singular;
   if (!path_.is_uncertain() || std::ranges::count(known, 0.0, &SingularPosition::half) > 0) return;
-  known.push_back(singular_position(mechanism_, path_.state().t, path_.state().y, 0));
+  known.push_back(singular_position(mechanism_, path_.state().t, path_.state().y));
 }
 
 bool DrivenRun::take_panel(double t1, const Take& take) {
   std::span<const SampleEvent> events = schedule_.take(t1);
-  const bool walks = !events.empty() || !nodes_.empty();
-  if (!walks) return true;
+  if (events.empty() && nodes_.empty()) return true;
   const DrivenState end = path_.state();
   if (!nodes_.empty() || events.front().time < t1) path_.start(from_);
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
@@ -307,7 +301,7 @@ bool DrivenRun::take_panel(double t1, const Take& take) {
       running_[r].weight = (t1 - from_.t) * kronrod_rule().kronrod[k];
       if (!is_left_out(g_[r * kNodes + k], nodes_[k].t)) at_instant_.push_back(running_[r]);
     }
-    if (take && !take(point(), at_instant_)) return false;
+    if (!take(point(), at_instant_)) return false;
   }
   for (std::size_t r = 0; r < running_.size(); ++r) {
     const PanelIntegral& I = integrals_[r];
@@ -328,30 +322,31 @@ bool DrivenRun::take_events_until(double t, std::span<const SampleEvent>& events
       stop_where_it_ends();
       return false;
     }
-    note_uncertain();
     at_instant_.clear();
     for (; !events.empty() && events.front().time == time; events = events.subspan(1)) {
       const SampleEvent& e = events.front();
       at_instant_.push_back({e.cost, e.objective, 1, e.index});
-      if (e.cost)
-        result_.psi(e.objective) += value_of(at_instant_.back(), point());
-      else if (window_at(time) && continued_)
-        for (const std::string& name : lacking_sensors(mechanism_, point())) singular_at(time).note(name);
     }
-    if (take && !take(point(), at_instant_)) return false;
+    if (!take_here(at_instant_, take)) return false;
   }
   return true;
 }
 
+bool DrivenRun::take_here(std::span<const DrivenTerm> terms, const Take& take) {
+  note_uncertain();
+  for (const DrivenTerm& term : terms) {
+    if (term.cost)
+      result_.psi(term.objective) += value_of(term, point());
+    else if (window_at(point().t) && continued_)
+      for (const std::string& name : lacking_sensors(mechanism_, point())) singular_at(point().t).note(name);
+  }
+  return take(point(), terms);
+}
+
 bool DrivenRun::take_terminal_costs(const Take& take) {
   for (std::size_t o = 0; o < costs_.size(); ++o) {
-    const PointCost* const cost = costs_[o].terminal.get();
-    if (!cost) continue;
-    note_uncertain();
-    const Eigen::Index objective = static_cast<Eigen::Index>(o);
-    const DrivenTerm term{cost, objective, 1, 0};
-    result_.psi(objective) += value_of(term, point());
-    if (take && !take(point(), std::span(&term, 1))) return false;
+    const DrivenTerm term{costs_[o].terminal.get(), static_cast<Eigen::Index>(o), 1, 0};
+    if (term.cost && !take_here(std::span(&term, 1), take)) return false;
   }
   return true;
 }

@@ -75,6 +75,7 @@ class DrivenRun {
   bool take_panel(double t1, const Take& take);
   void add_quadrature_errors();
   bool take_events_until(double t, std::span<const SampleEvent>& events, const Take& take);
+  bool take_here(std::span<const DrivenTerm> terms, const Take& take);  // at the state of the path
   bool take_terminal_costs(const Take& take);
   void end_panel(double t0, double t1);
   void stop(SimulationStatus status, const std::string& message);

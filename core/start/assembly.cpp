@@ -1,9 +1,9 @@
 #include "core/start/assembly.hpp"
 
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
-#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -20,7 +20,6 @@
 #include "core/mechanism/sensor_gradient.hpp"
 #include "core/projection/projection.hpp"
 #include "core/start/assembly_equations.hpp"
-#include "core/start/assembly_problems.hpp"
 #include "core/start/assembly_report.hpp"
 #include "core/start/equilibrium.hpp"
 #include "core/start/nearest_point.hpp"
@@ -30,6 +29,7 @@ namespace mbsopt {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using Triplet = Eigen::Triplet<double, Index>;
 
 namespace {
 
@@ -73,18 +73,19 @@ MatrixXd position_guess_rho(const MechanismData& d) {
   return out;
 }
 
-// v_q holds a block per body in its own p; that of the ground is not set.
-void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, std::vector<Mat<7, 4>>& v_q,
-                                MatrixXd& v_rho) {
+// Adds the blocks of each body in its own p to v_q.
+void add_velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, std::vector<Triplet>& v_q,
+                                    MatrixXd& v_rho) {
   const StateLayout layout{d.n};
-  v_q.resize(d.bodies.size());
-  v_rho = MatrixXd::Zero(q.size(), d.rho.size());
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& body = d.bodies[at(i)];
     const Vector4d p = q.segment<4>(layout.p(i));
     const Matrix3d W = skew(body.angular_velocity);
     const Vector3d arm = A(p) * body.com, e = p.tail<3>();
-    v_q[at(i)] << W * N(p, body.com), rate_matrix(body.angular_velocity);
+    Mat<7, 4> of_p;
+    of_p << W * N(p, body.com), rate_matrix(body.angular_velocity);
+    for (Index r = 0; r < 7; ++r)
+      for (Index c = 0; c < 4; ++c) v_q.emplace_back(layout.q(i) + r, layout.p(i) + c, of_p(r, c));
     Mat<7, 3> from_omega;
     from_omega.topRows<3>() = -skew(arm);
     from_omega.row(3) = -0.5 * e.transpose();
@@ -114,7 +115,6 @@ struct Assembly::Solution {
   void solve() {
     const Index N = layout.positions();
     result.y = VectorXd::Zero(2 * N);
-    AssemblyProblem positions(position);
     const VectorXd guess = position_guess(data);
     result.y.head(N) = guess;
     position.start_branches(result.y);
@@ -123,26 +123,23 @@ struct Assembly::Solution {
       result.message = "the mechanism does not close in the assembly mode of its guess";
       return;
     }
-    q.emplace(nearest_point(positions, guess, data.assembly_iterations));
-    result.y.head(N) = q->x;
-    result.iterations = q->iterations;
-    result.residual = q->F.size() > 0 ? q->F.lpNorm<Eigen::Infinity>() : 0.0;
-    if (q->status != NearestPointStatus::found) {
-      result.message = assembly_failure(data, AssemblyLevel::position, position, *q);
-      return;
-    }
+    if (!find(position, guess, q, result.y.head(N))) return;
     if (data.equilibrium) return rest_in_equilibrium();
     velocity.set_angles(position.followed_angles());
-    AssemblyProblem velocities(velocity, q->x);
-    v.emplace(nearest_point(velocities, velocity_guess(data, q->x), data.assembly_iterations));
-    result.y.tail(N) = v->x;
-    result.iterations += v->iterations;
-    result.residual = std::max(result.residual, v->F.lpNorm<Eigen::Infinity>());
-    if (v->status != NearestPointStatus::found) {
-      result.message = assembly_failure(data, AssemblyLevel::velocity, velocity, *v);
-      return;
-    }
-    result.ok = true;
+    velocity.hold(q->x);
+    result.ok = find(velocity, velocity_guess(data, q->x), v, result.y.tail(N));
+  }
+
+  // Finds the unknowns of one level. Returns false with a message if there is no point nearest to their guess.
+  bool find(AssemblyEquations& equations, const VectorXd& guess, std::optional<NearestPoint>& point,
+            Eigen::Ref<VectorXd> unknowns) {
+    point.emplace(nearest_point(equations, guess, data.assembly_iterations));
+    unknowns = point->x;
+    result.iterations += point->iterations;
+    if (point->F.size() > 0) result.residual = std::max(result.residual, point->F.lpNorm<Eigen::Infinity>());
+    if (point->status == NearestPointStatus::found) return true;
+    result.message = assembly_failure(data, equations, *point);
+    return false;
   }
 
   // Takes damped Newton steps on three unknowns per body if a planar mechanism has no freedom. They lead to the
@@ -150,7 +147,7 @@ struct Assembly::Solution {
   // an equation: the guess may lie out of the plane.
   bool solve_in_plane() {
     constexpr double kSatisfied = 1e-11;  // of the equations, per unit of y, as in nearest_point.cpp
-    const bool determined = data.planar && data.planar->rows.size() == 3 * static_cast<std::size_t>(data.n);
+    const bool determined = data.planar && data.planar->rows.size() == 3 * at(data.n);
     if (!determined || data.equilibrium || !position.targets().empty() || !velocity.targets().empty()) return false;
     const Index N = layout.positions();
     VectorXd y_guess = result.y, y = result.y;
@@ -161,13 +158,14 @@ struct Assembly::Solution {
     const auto found = [&](const AssemblyEquations& equations, const VectorXd& x) {
       NearestPoint point;
       point.status = NearestPointStatus::found, point.determined = true, point.linearised = false;
-      point.x = x, point.F = equations.values(y), point.nu = VectorXd::Zero(point.F.size());
+      point.x = x, point.F = equations.values_at(y), point.nu = VectorXd::Zero(point.F.size());
       return point;
     };
     const NearestPoint at = found(position, y.head(N)), moving = found(velocity, y.tail(N));
     const double left = std::max(at.F.lpNorm<Eigen::Infinity>(), moving.F.lpNorm<Eigen::Infinity>());
     if (!(left <= kSatisfied * (1 + y.lpNorm<Eigen::Infinity>()))) return false;
-    position.continue_branches(y);
+    position.accept(y.head(N));
+    velocity.hold(y.head(N));
     velocity.set_angles(position.followed_angles());
     result.y = y, result.residual = left, result.iterations = static_cast<int>(projector->factorisations());
     q = at, v = moving;
@@ -210,53 +208,47 @@ struct Assembly::Solution {
   //   J_q q' = -q_F_rho,           H_q q' + .. = q_g_rho
   //   J_v v' = -F_q q' - F_rho,    H_v v' + .. = g_q q' + g_rho
   struct Derivatives {
-    std::vector<SparseEntry> q_J, v_J, v_b_q;  // v_b_q = -F_q at velocity level
+    std::vector<SparseEntry> q_J, v_J;
     MatrixXd q_b_rho, q_g_rho, v_b_rho, v_g_rho;
-    std::vector<Mat<7, 4>> v_guess_q{};  // per body, in its own p; none if nothing is free
-    MatrixXd v_curvature{};              // (J_v'nu)_q; none if nu = 0
-
-    MatrixXd b_of(const MatrixXd& q_rho) const {  // -F_q q'
-      MatrixXd b = MatrixXd::Zero(v_b_rho.rows(), q_rho.cols());
-      for (const SparseEntry& e : v_b_q) b.row(e.row) += e.value * q_rho.row(e.column);
-      return b;
-    }
-    MatrixXd g_of(const MatrixXd& q_rho) const {  // g_q q'
-      MatrixXd g = MatrixXd::Zero(v_g_rho.rows(), q_rho.cols());
-      if (v_curvature.size() > 0) g -= v_curvature * q_rho;
-      for (Index i = 1; i < std::ssize(v_guess_q); ++i)
-        g.middleRows<7>(7 * i - 7) += v_guess_q[at(static_cast<int>(i))] * q_rho.middleRows<4>(7 * i - 4);
-      return g;
-    }
-    void add_to_q_bar(const MatrixXd& b_bar, const MatrixXd& g_bar, MatrixXd& q_bar) const {
-      for (const SparseEntry& e : v_b_q) q_bar.row(e.column) += e.value * b_bar.row(e.row);
-      if (v_curvature.size() > 0) q_bar -= v_curvature.transpose() * g_bar;
-      for (Index i = 1; i < std::ssize(v_guess_q); ++i)
-        q_bar.middleRows<4>(7 * i - 4) +=
-            v_guess_q[at(static_cast<int>(i))].transpose() * g_bar.middleRows<7>(7 * i - 7);
-    }
+    Eigen::SparseMatrix<double> v_b_q, v_g_q;  // -F_q and g_q at velocity level
   };
   Derivatives derivatives() const {
     const Index N = layout.positions(), P = data.rho.size();
     const auto is_free = [](const NearestPoint& point) {
       return !point.linearised || point.linearisation.null_space().cols() > 0;
     };
-    AssemblyEquations::SparseGradients F = position.sparse_gradients(result.y), G = velocity.sparse_gradients(result.y);
-    Derivatives d{std::move(F.y), {}, {}, -F.rho, MatrixXd::Zero(N, P), -G.rho, MatrixXd::Zero(N, P)};
-    for (const SparseEntry& e : G.y) {
-      if (e.column < N) {
-        d.v_b_q.push_back({e.row, e.column, -e.value});
-      } else {
+    Derivatives d;
+    d.q_J = position.entries(result.y, &d.q_b_rho);
+    std::vector<Triplet> b_q, g_q;
+    for (const SparseEntry& e : velocity.entries(result.y, &d.v_b_rho)) {
+      if (e.column < N)
+        b_q.emplace_back(e.row, e.column, -e.value);
+      else
         d.v_J.push_back({e.row, static_cast<int>(e.column - N), e.value});
-      }
     }
+    d.q_b_rho *= -1, d.v_b_rho *= -1;
+    d.q_g_rho = d.v_g_rho = MatrixXd::Zero(N, P);
     if (is_free(*q)) d.q_g_rho = position_guess_rho(data);
     if (is_free(*q) && q->nu.any()) d.q_g_rho -= position.second(result.y, q->nu).rho;
-    if (is_free(*v)) velocity_guess_derivatives(data, q->x, d.v_guess_q, d.v_g_rho);
+    if (is_free(*v)) add_velocity_guess_derivatives(data, q->x, g_q, d.v_g_rho);
+    d.v_b_q.resize(velocity.rows(), N), d.v_b_q.setFromTriplets(b_q.begin(), b_q.end());
+    d.v_g_q.resize(N, N), d.v_g_q.setFromTriplets(g_q.begin(), g_q.end());
     if (!is_free(*v) || !v->nu.any()) return d;
-    const AssemblyEquations::Gradients S = velocity.second(result.y, v->nu);
-    d.v_curvature = S.y.leftCols(N);
+    const AssemblyEquations::Gradients S = velocity.second(result.y, v->nu);  // of J_v'nu
+    d.v_g_q -= Eigen::SparseMatrix<double>(S.y.leftCols(N).sparseView());
     d.v_g_rho -= S.rho;
     return d;
+  }
+  struct Tangents {
+    MatrixXd q, v, v_b_of_q, v_g;  // q', v' and the right-hand sides of v': -F_q q', g_q q' + g_rho
+  };
+  template <class System>
+  static Tangents tangents(const System& q, const System& v, const Derivatives& d) {
+    Tangents t;
+    t.q = q.solve(d.q_b_rho, d.q_g_rho);
+    t.v_b_of_q = d.v_b_q * t.q, t.v_g = d.v_g_rho + d.v_g_q * t.q;
+    t.v = v.solve(t.v_b_of_q + d.v_b_rho, t.v_g);
+    return t;
   }
 
   // Calls f(q, v, derivatives): q and v solve the linear systems. Sparse factors differentiate a large mechanism whose
@@ -269,9 +261,8 @@ struct Assembly::Solution {
       const Derivatives d = derivatives();
       return f(SparseProjection(position.rows(), N, d.q_J), SparseProjection(velocity.rows(), N, d.v_J), d);
     }
-    AssemblyProblem positions(position), velocities(velocity, q->x);
-    linearise(positions, *q);
-    linearise(velocities, *v);
+    linearise(position, *q);
+    linearise(velocity, *v);
     f(q->linearisation, v->linearisation, derivatives());
   }
 
@@ -302,8 +293,8 @@ MatrixXd Assembly::tangent() const {
     return y_rho;
   }
   s.with_systems([&](const auto& q, const auto& v, const Solution::Derivatives& d) {
-    const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho);
-    y_rho << q_rho, v.solve(d.b_of(q_rho) + d.v_b_rho, d.g_of(q_rho) + d.v_g_rho);
+    const Solution::Tangents t = Solution::tangents(q, v, d);
+    y_rho << t.q, t.v;
   });
   return y_rho;
 }
@@ -320,10 +311,10 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
     return;
   }
   s.with_systems([&](const auto& q, const auto& v, const Solution::Derivatives& d) {
-    MatrixXd b_bar, g_bar, q_bar = y_bar.topRows(N);
+    MatrixXd b_bar, g_bar;
     v.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
     rho_bar += d.v_b_rho.transpose() * b_bar + d.v_g_rho.transpose() * g_bar;
-    d.add_to_q_bar(b_bar, g_bar, q_bar);
+    const MatrixXd q_bar = y_bar.topRows(N) + d.v_b_q.transpose() * b_bar + d.v_g_q.transpose() * g_bar;
     q.solve_transposed(q_bar, b_bar, g_bar);
     rho_bar += d.q_b_rho.transpose() * b_bar + d.q_g_rho.transpose() * g_bar;
   });
@@ -351,13 +342,13 @@ std::vector<int> Assembly::obstructed() const {
   if (s.data.equilibrium) {
     const AssemblyEquations::Gradients F = s.position.gradients(s.result.y);
     const MatrixXd J = F.y.leftCols(s.layout.positions());
-    const NearestPointLinearisation q(J, sizes_of_poses(J));
+    const NearestPointLinearisation q(J, s.position.sizes(J));
     add(q, q.pseudo_inverse_times(-F.rho), {-F.rho});
   } else {
     s.with_systems([&](const auto& q, const auto& v, const Solution::Derivatives& d) {
-      const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho), turned = d.b_of(q_rho);
-      add(q, q_rho, {d.q_b_rho});
-      add(v, v.solve(turned + d.v_b_rho, d.v_g_rho), {turned, d.v_b_rho});
+      const Solution::Tangents t = Solution::tangents(q, v, d);
+      add(q, t.q, {d.q_b_rho});
+      add(v, t.v, {t.v_b_of_q, d.v_b_rho});
     });
   }
   std::ranges::sort(parameters);
@@ -371,9 +362,8 @@ double Assembly::rounding() const {
   double rounding = 0;
   s.with_systems([&]<class System>(const System& q, const System& v, const Solution::Derivatives& d) {
     if constexpr (std::is_same_v<System, NearestPointLinearisation>) {
-      const MatrixXd q_rho = q.solve(d.q_b_rho, d.q_g_rho), v_g = d.g_of(q_rho) + d.v_g_rho;
-      const MatrixXd v_rho = v.solve(d.b_of(q_rho) + d.v_b_rho, v_g);
-      rounding = std::max(q.rounding(q_rho, d.q_g_rho), v.rounding(v_rho, v_g));
+      const Solution::Tangents t = Solution::tangents(q, v, d);
+      rounding = std::max(q.rounding(t.q, d.q_g_rho), v.rounding(t.v, t.v_g));
     }
   });
   return rounding;
@@ -396,7 +386,7 @@ ModelSummary Assembly::summary() const {
   const MechanismData& d = solution_->data;
   const int equations = d.m + d.n, coordinates = static_cast<int>(solution_->layout.positions());
   const auto place = [&](int row) { return row < d.m ? row + d.n : row - d.m; };
-  std::vector<SparseEntry> J = solution_->position.sparse_gradients(solution_->result.y).y;
+  std::vector<SparseEntry> J = solution_->position.entries(solution_->result.y);
   std::erase_if(J, [&](const SparseEntry& e) { return e.row >= equations || e.column >= coordinates; });
   for (SparseEntry& e : J) e.row = place(e.row);
   const RowDependence found = row_dependence(equations, d.n, 7, J, NearestPointLinearisation::kRankThreshold);
@@ -406,11 +396,9 @@ ModelSummary Assembly::summary() const {
   for (const Constraint& c : d.constraints) {
     if (c.row < next_row) continue;  // a further term of a row already seen
     next_row = c.row + c.rows();
-    const std::size_t owner =
-        c.drive >= 0 ? joints + static_cast<std::size_t>(c.drive) : static_cast<std::size_t>(c.joint);
+    const std::size_t owner = c.drive >= 0 ? joints + at(c.drive) : at(c.joint);
     rows[owner] += c.rows();
-    for (int i = 0; i < c.rows(); ++i)
-      redundant[owner] += found.independent[static_cast<std::size_t>(place(c.row + i))] ? 0 : 1;
+    for (int i = 0; i < c.rows(); ++i) redundant[owner] += found.independent[at(place(c.row + i))] ? 0 : 1;
   }
   ModelSummary summary;
   summary.bodies = d.n;

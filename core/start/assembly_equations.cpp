@@ -7,6 +7,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
+#include "core/dynamics/constraint_terms.hpp"
 #include "core/mechanism/followed_angles.hpp"
 #include "core/mechanism/sensor_gradient.hpp"
 
@@ -29,12 +30,6 @@ VectorXd with_unit_velocity(const VectorXd& y, Index j) {
   return at;
 }
 
-struct PrimitiveBars {
-  FrameBar bar1, bar2;
-  GeometryBar s;
-  PrimitiveBars() { bar1.set_zero(), bar2.set_zero(); }
-};
-
 }  // namespace
 
 AssemblyEquations::AssemblyEquations(const MechanismData& data, AssemblyLevel level, double t)
@@ -46,7 +41,7 @@ AssemblyEquations::AssemblyEquations(const MechanismData& data, AssemblyLevel le
   laws_.set_time(t);
   for (std::size_t i = 0; i < data.conditions.size(); ++i) {
     const ConditionData& c = data.conditions[i];
-    const SensorPtr& sensor = data.sensors[static_cast<std::size_t>(c.sensor)];
+    const SensorPtr& sensor = data.sensors[at(c.sensor)];
     const int index = static_cast<int>(i);
     if (level == AssemblyLevel::position) {
       if (c.has_value && !c.velocity_level) {
@@ -81,36 +76,19 @@ VectorXd AssemblyEquations::branches(const AssemblyTarget& target) const {
   return VectorXd::Constant(static_cast<Index>(data_.angles.size()), target.branch);
 }
 
-// factor * primitive of a constraint of one row, at position level.
-double AssemblyEquations::term_value(const Constraint& c, const VectorXd& y, const VectorXd& angles) const {
-  const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
-  return std::visit(
-      [&]<class P>(const P& p) {
-        Vec<P::kRows> phi;
-        p.phi(b1.frame, b2.frame, phi);
-        if constexpr (std::is_same_v<P, Angle>) {
-          const double reference = c.angle == Constraint::kNearestLaw ? laws_.f_or_zero(c.row) : angles(c.angle);
-          return c.factor * Angle::on_branch(phi(0), reference);
-        }
-        return c.factor * phi(0);
-      },
-      c.primitive);
-}
-
 void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) const {
+  if (std::ranges::none_of(data_.groups, &RowGroup::shared)) return;
+  const BodiesAt bodies(y);
+  VectorXd phi(data_.m);
   for (const RowGroup& g : data_.groups) {
     if (!g.shared) continue;
-    double sum = 0;
     const Constraint* last = nullptr;
-    for (const Constraint& c :
-         std::ranges::equal_range(data_.constraints, g.row, {}, &Constraint::row)) {  // they ascend
-      sum += term_value(c, y, angles);
+    for (const Constraint& c : std::ranges::equal_range(data_.constraints, g.row, {}, &Constraint::row))  // they ascend
       if (std::holds_alternative<Angle>(c.primitive)) last = &c;
-    }
-    sum -= laws_.f_or_zero(g.row);
     if (!last || last->factor == 0) continue;
+    ConstraintTerms(data_).phi(bodies.frames, laws_, angles, phi);
     double& angle = angles(last->angle);
-    angle = Angle::on_branch(angle, angle - sum / last->factor);
+    angle = Angle::on_branch(angle, angle - phi(g.row) / last->factor);
   }
 }
 
@@ -125,96 +103,102 @@ void AssemblyEquations::start_branches(const VectorXd& y) {
   settle_shared_rows(y, angles_);
 }
 
-void AssemblyEquations::continue_branches(const VectorXd& y) {
+VectorXd AssemblyEquations::state(const VectorXd& x) const {
+  VectorXd y = VectorXd::Zero(2 * x.size());
+  if (!positions()) y.head(x.size()) = q_;
+  y.segment(first(x), x.size()) = x;
+  return y;
+}
+
+template <class F>
+void AssemblyEquations::for_jacobian(const VectorXd& x, F&& f) const {
+  for (const SparseEntry& e : entries(state(x))) {
+    const Index k = e.column - first(x);
+    if (k >= 0 && k < x.size()) f(e.row, k, e.value);
+  }
+}
+
+MatrixXd AssemblyEquations::jacobian(const VectorXd& x) const {
+  MatrixXd J = MatrixXd::Zero(rows(), x.size());
+  for_jacobian(x, [&](Index row, Index k, double value) { J(row, k) += value; });
+  return J;
+}
+
+VectorXd AssemblyEquations::magnitudes(const VectorXd& x) const {
+  VectorXd largest = x.cwiseAbs(), sums = VectorXd::Zero(rows());
+  for (Index i = 0; i < x.size(); i += 7) {
+    largest.segment<3>(i).setConstant(largest.segment<3>(i).maxCoeff());
+    largest.segment<4>(i + 3).setConstant(largest.segment<4>(i + 3).maxCoeff());
+  }
+  for_jacobian(x, [&](Index row, Index k, double value) { sums(row) += std::abs(value) * largest(k); });
+  return sums;
+}
+
+VectorXd AssemblyEquations::sizes(const MatrixXd& J) const {
+  double r = 0, p = 0;
+  for (Index k = 0; k < J.cols(); k += 7) {
+    for (Index i = 0; i < J.rows(); ++i) {
+      const double here = J.row(i).segment<3>(k).squaredNorm();
+      if (here > 0) r += here, p += J.row(i).segment<4>(k + 3).squaredNorm();
+    }
+  }
+  const double length = p > 0 ? std::sqrt(p / r) : 1;
+  VectorXd sizes = VectorXd::Ones(J.cols());
+  for (Index k = 0; k < J.cols(); k += 7) sizes.segment<3>(k).setConstant(length);
+  return sizes;
+}
+
+// No Euler parameter changes by more than 0.3 in one step (about 0.6 rad); r and v enter linearly.
+double AssemblyEquations::step_fraction(const VectorXd& step) const {
+  double change = 0;
+  for (Index i = 3; i < step.size() && positions(); i += 7)
+    change = std::max(change, step.segment<4>(i).lpNorm<Eigen::Infinity>());
+  return change > 0.3 ? 0.3 / change : 1.0;
+}
+
+VectorXd AssemblyEquations::retracted(const VectorXd& x) const {
+  VectorXd out = x;
+  for (Index i = 3; i < x.size() && positions(); i += 7) out.segment<4>(i) = UnitNorm::project(x.segment<4>(i));
+  return out;
+}
+
+void AssemblyEquations::accept(const VectorXd& x) {
+  if (!positions()) return;
+  const VectorXd y = state(x);
   continue_angles(data_, y, angles_);
-  for (AssemblyTarget& target : targets_) {
-    if (target.sensor->angle() >= 0) {
-      target.branch = evaluate(data_, target.sensor, t_, y, branches(target));
-    }
-  }
+  for (AssemblyTarget& target : targets_)
+    if (target.sensor->angle() >= 0) target.branch = evaluate(data_, target.sensor, t_, y, branches(target));
 }
 
-void AssemblyEquations::add_slot(int slot, const Eigen::Ref<const VectorXd>& bar, Row rho_bar) const {
-  if (slot < 0) return;
-  for (std::size_t k = 0; k < data_.active.size(); ++k) {
-    rho_bar(data_.active[k]) += data_.theta_rho.col(static_cast<Index>(k)).segment(slot, bar.size()).dot(bar);
-  }
-}
-
-VectorXd AssemblyEquations::values(const VectorXd& y) const {
-  VectorXd F = VectorXd::Zero(rows());
-  const bool positions = level_ == AssemblyLevel::position;
-  for (const Constraint& c : data_.constraints) {
-    if (positions && c.rows() == 1) {
-      F(c.row) += term_value(c, y, angles_);
-      continue;
-    }
-    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
-    std::visit(
-        [&]<class P>(const P& p) {
-          Vec<P::kRows> phi;
-          if (positions) {
-            p.phi(b1.frame, b2.frame, phi);
-          } else {
-            p.phi_dot(b1.frame, b2.frame, phi);
-          }
-          F.segment<P::kRows>(c.row) += c.factor * phi;
-        },
-        c.primitive);
-  }
-  if (positions) {
-    laws_.subtract_f(F);
-  } else {
-    laws_.subtract_f_t(F);
-  }
-  const StateLayout layout{data_.n};
+VectorXd AssemblyEquations::values_at(const VectorXd& y) const {
+  const BodiesAt bodies(y);
+  VectorXd of_joints(data_.m), F(rows());
+  if (positions())
+    ConstraintTerms(data_).phi(bodies.frames, laws_, angles_, of_joints);
+  else
+    ConstraintTerms(data_).phi_dot(bodies.frames, laws_, of_joints);
+  F.head(data_.m) = of_joints;
   Index row = data_.m;
-  for (int i = 1; i <= data_.n; ++i) {
-    const Vector4d p = y.segment<4>(layout.p(i)), pdot = y.segment<4>(layout.pdot(i));
-    F(row++) = level_ == AssemblyLevel::position ? UnitNorm::phi(p) : UnitNorm::phi_dot(p, pdot);
+  for (std::size_t i = 1; i < bodies.states.size(); ++i) {
+    const BodyState& b = bodies.states[i];
+    F(row++) = positions() ? UnitNorm::phi(b.p) : UnitNorm::phi_dot(b.p, b.pdot);
   }
-  for (const AssemblyTarget& target : targets_) {
+  for (const AssemblyTarget& target : targets_)
     F(row++) = evaluate(data_, target.sensor, t_, y, branches(target)) - target.value;
-  }
   return F;
-}
-
-AssemblyEquations::Gradients AssemblyEquations::gradients(const VectorXd& y) const {
-  Gradients out{MatrixXd::Zero(rows(), y.size()), {}};
-  collect_gradients(
-      y, [&](Index row, Index column, double value) { out.y(row, column) += value; }, &out.rho);
-  return out;
-}
-
-MatrixXd AssemblyEquations::gradients_in_y(const VectorXd& y) const {
-  MatrixXd F_y = MatrixXd::Zero(rows(), y.size());
-  collect_gradients(
-      y, [&](Index row, Index column, double value) { F_y(row, column) += value; }, nullptr);
-  return F_y;
-}
-
-AssemblyEquations::SparseGradients AssemblyEquations::sparse_gradients(const VectorXd& y) const {
-  SparseGradients out;
-  collect_gradients(
-      y,
-      [&](Index row, Index column, double value) {
-        if (value != 0) out.y.push_back({static_cast<int>(row), static_cast<int>(column), value});
-      },
-      &out.rho);
-  return out;
 }
 
 // Calls add(row, column, value) for the gradient in y of the joints' rows at a level, and add_field(row, slot, bar) for
 // that in fields. If `only` is a body, other bodies' joints are left out.
 template <class AddEntry, class AddField>
-void AssemblyEquations::collect_joints(AssemblyLevel level, const VectorXd& y, int only, AddEntry&& add,
-                                       AddField&& add_field) const {
+void AssemblyEquations::for_joint_gradients(AssemblyLevel level, const BodiesAt& bodies, int only, AddEntry&& add,
+                                            AddField&& add_field) const {
   const bool positions = level == AssemblyLevel::position;
   const StateLayout layout{data_.n};
-  const auto add_body = [&](Index row, const BodyAt& b, int body, const FrameBar& bar) {
+  const auto add_body = [&](Index row, int body, const FrameBar& bar) {
     if (body == 0) return;
     Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
-    add_pull_back_velocity(b.state, bar, 1, q_bar, v_bar);
+    add_pull_back_velocity(bodies.states[at(body)], bar, 1, q_bar, v_bar);
     for (Index k = 0; k < 7; ++k) {
       add(row, layout.q(body) + k, q_bar(k));
       add(row, layout.v(body) + k, v_bar(k));
@@ -222,46 +206,53 @@ void AssemblyEquations::collect_joints(AssemblyLevel level, const VectorXd& y, i
   };
   for (const Constraint& c : data_.constraints) {
     if (only > 0 && c.body1 != only && c.body2 != only) continue;
-    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    const Frame &f1 = bodies.frames[at(c.body1)], &f2 = bodies.frames[at(c.body2)];
     std::visit(
         [&]<class P>(const P& p) {
           for (int i = 0; i < P::kRows; ++i) {
             Multipliers<P::kRows> unit = Multipliers<P::kRows>::zero();
             (positions ? unit.mu0 : unit.mu1) = c.factor * Vec<P::kRows>::Unit(i);
-            PrimitiveBars bars;
-            p.pull_back(b1.frame, b2.frame, unit, bars.bar1, bars.bar2, bars.s);
+            FrameBar bar1, bar2;
+            GeometryBar s;
+            bar1.set_zero(), bar2.set_zero();
+            p.pull_back(f1, f2, unit, bar1, bar2, s);
             const Index row = c.row + i;
-            add_body(row, b1, c.body1, bars.bar1);
-            add_body(row, b2, c.body2, bars.bar2);
-            add_field(row, c.slot1, bars.s.s1);
-            add_field(row, c.slot2, bars.s.s2);
-            add_field(row, c.slot3, bars.s.s3);
+            add_body(row, c.body1, bar1), add_body(row, c.body2, bar2);
+            add_field(row, c.slot1, s.s1), add_field(row, c.slot2, s.s2), add_field(row, c.slot3, s.s3);
           }
           if (c.slot_factor < 0) return;
-          Vec<P::kRows> phi_dot;
-          p.phi_dot(b1.frame, b2.frame, phi_dot);
-          add_field(c.row, c.slot_factor, Vec<1>(positions ? term_value(c, y, angles_) / c.factor : phi_dot(0)));
+          Vec<P::kRows> phi;
+          positions ? p.phi(f1, f2, phi) : p.phi_dot(f1, f2, phi);
+          if (positions && std::is_same_v<P, Angle>)
+            phi(0) = Angle::on_branch(phi(0),
+                                      c.angle == Constraint::kNearestLaw ? laws_.f_or_zero(c.row) : angles_(c.angle));
+          add_field(c.row, c.slot_factor, Vec<1>(phi(0)));
         },
         c.primitive);
   }
 }
 
-// rho is null if it is not wanted.
-template <class AddEntry>
-void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd* rho) const {
-  const bool positions = level_ == AssemblyLevel::position;
+std::vector<SparseEntry> AssemblyEquations::entries(const VectorXd& y, MatrixXd* rho) const {
   const StateLayout layout{data_.n};
-  if (rho) *rho = MatrixXd::Zero(rows(), data_.rho.size());
-  collect_joints(level_, y, 0, add, [&](Index row, int slot, const auto& bar) {
-    if (rho) add_slot(slot, bar, rho->row(row));
-  });
-  if (rho) add_law_gradients(*rho);
+  std::vector<SparseEntry> out;
+  MatrixXd rho_bars = MatrixXd::Zero(data_.rho.size(), rho ? rows() : 0);  // a column per row
+  const auto add = [&](Index row, Index column, double value) {
+    if (value != 0) out.push_back({static_cast<int>(row), static_cast<int>(column), value});
+  };
+  const auto add_field = [&](Index row, int slot, const auto& bar) {
+    if (rho) FieldGradient{data_.theta_rho, data_.active, 1, rho_bars.col(row)}.add(slot, bar);
+  };
+  for_joint_gradients(level_, BodiesAt(y), 0, add, add_field);
+  for (const RowLaw& law : data_.laws) {
+    const RowLaws::Derivative what = positions() ? RowLaws::Derivative::f : RowLaws::Derivative::f_t;
+    if (rho) laws_.add_gradient(what, law.row, -1, rho_bars.col(law.row));
+  }
   Index row = data_.m;
   for (int i = 1; i <= data_.n; ++i, ++row) {
     const Index p = layout.p(i), pdot = layout.pdot(i);
     for (Index k = 0; k < 4; ++k) {
-      add(row, p + k, 2 * y(positions ? p + k : pdot + k));
-      if (!positions) add(row, pdot + k, 2 * y(p + k));
+      add(row, p + k, 2 * y(positions() ? p + k : pdot + k));
+      if (!positions()) add(row, pdot + k, 2 * y(p + k));
     }
   }
   VectorXd y_bar(y.size()), rho_bar(data_.rho.size());
@@ -269,38 +260,45 @@ void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, Mat
     y_bar.setZero(), rho_bar.setZero();
     add_gradient(data_, target.sensor, t_, y, branches(target), 1, y_bar, rho_bar);
     for (Index k = 0; k < y.size(); ++k) add(row, k, y_bar(k));
-    if (rho) {
-      rho->row(row) = rho_bar.transpose();
-      add_slot(target.slot, Vec<1>(-1), rho->row(row));
-    }
+    add_field(row, target.slot, Vec<1>(-1));
+    if (rho) rho_bars.col(row) += rho_bar;
     ++row;
   }
+  if (rho) *rho = rho_bars.transpose();
+  return out;
 }
 
-void AssemblyEquations::add_law_gradients(MatrixXd& rho) const {
-  const RowLaws::Derivative what =
-      level_ == AssemblyLevel::position ? RowLaws::Derivative::f : RowLaws::Derivative::f_t;
-  VectorXd rho_bar(data_.rho.size());
-  for (const RowLaw& law : data_.laws) {
-    rho_bar.setZero();
-    laws_.add_gradient(what, law.row, -1, rho_bar);
-    rho.row(law.row) += rho_bar.transpose();
-  }
+AssemblyEquations::Gradients AssemblyEquations::gradients(const VectorXd& y) const {
+  Gradients out{MatrixXd::Zero(rows(), y.size()), {}};
+  for (const SparseEntry& e : entries(y, &out.rho)) out.y(e.row, e.column) += e.value;
+  return out;
 }
 
 AssemblyEquations::Gradients AssemblyEquations::second(const VectorXd& y, const VectorXd& nu) const {
   const Index N = y.size() / 2;
-  Gradients out{MatrixXd::Zero(N, y.size()), MatrixXd::Zero(N, data_.rho.size())};
   const StateLayout layout{data_.n};
+  Gradients out{MatrixXd::Zero(N, y.size()), {}};
+  MatrixXd rho_bars = MatrixXd::Zero(data_.rho.size(), N);
+  VectorXd at_rest = y;
+  at_rest.tail(N).setZero();
+  BodiesAt bodies(at_rest);
   for (int i = 1; i <= data_.n; ++i) {
+    BodyState& state = bodies.states[at(i)];
+    Frame& frame = bodies.frames[at(i)];
     for (Index j = layout.q(i); j < layout.q(i) + 7; ++j) {
-      const auto add = [&](Index row, Index column, double value) {
-        if (column < N) out.y(j, column) += nu(row) * value;
-      };
-      collect_joints(AssemblyLevel::velocity, with_unit_velocity(y, j), i, add,
-                     [&](Index row, int slot, const auto& bar) { add_slot(slot, nu(row) * bar, out.rho.row(j)); });
+      set_velocity(Vec<7>::Unit(j - layout.q(i)), state, frame);
+      for_joint_gradients(
+          AssemblyLevel::velocity, bodies, i,
+          [&](Index row, Index column, double value) {
+            if (column < N) out.y(j, column) += nu(row) * value;
+          },
+          [&](Index row, int slot, const auto& bar) {
+            FieldGradient{data_.theta_rho, data_.active, nu(row), rho_bars.col(j)}.add(slot, bar);
+          });
     }
+    set_velocity(Vec<7>::Zero(), state, frame);
   }
+  out.rho = rho_bars.transpose();
   Index row = data_.m;
   for (int i = 1; i <= data_.n; ++i) {
     out.y.block<4, 4>(layout.p(i), layout.p(i)).diagonal().array() += 2 * nu(row++);
@@ -313,30 +311,24 @@ void AssemblyEquations::add_target_curvature(const AssemblyTarget& target, const
                                              Gradients& out) const {
   const Index N = y.size() / 2, P = data_.rho.size();
   const VectorXd branch = branches(target);
-  const std::vector<SensorPtr> components = target.rate->components();
   VectorXd y_bar(y.size()), rho_bar(P);
-  if (components.empty()) {
+  const auto add_linear = [&](const SensorPtr& rate, double weight) {
     for (Index j = 0; j < N; ++j) {
       y_bar.setZero(), rho_bar.setZero();
-      add_gradient(data_, target.rate, t_, with_unit_velocity(y, j), branch, nu, y_bar, rho_bar);
+      add_gradient(data_, rate, t_, with_unit_velocity(y, j), branch, weight, y_bar, rho_bar);
       out.y.row(j).head(N) += y_bar.head(N).transpose();
       out.rho.row(j) += rho_bar.transpose();
     }
-    return;
-  }
+  };
+  const std::vector<SensorPtr> components = target.rate->components();
+  if (components.empty()) return add_linear(target.rate, nu);
   // f = |c| with components c_i linear in v:  f_v = c'c_v/f,  d f_v = (dc' c_v + c' dc_v - f_v df)/f
   VectorXd f_y = VectorXd::Zero(y.size()), f_rho = VectorXd::Zero(P);
   const double f = add_gradient(data_, target.sensor, t_, y, branch, 1, f_y, f_rho);
   if (f == 0) return;
   for (const SensorPtr& component : components) {
     VectorXd c_y = VectorXd::Zero(y.size()), c_rho = VectorXd::Zero(P);
-    const double c = add_gradient(data_, component, t_, y, branch, 1, c_y, c_rho);
-    for (Index j = 0; j < N; ++j) {
-      y_bar.setZero(), rho_bar.setZero();
-      add_gradient(data_, component, t_, with_unit_velocity(y, j), branch, nu * c / f, y_bar, rho_bar);
-      out.y.row(j).head(N) += y_bar.head(N).transpose();
-      out.rho.row(j) += rho_bar.transpose();
-    }
+    add_linear(component, nu / f * add_gradient(data_, component, t_, y, branch, 1, c_y, c_rho));
     out.y += nu / f * c_y.tail(N) * c_y.transpose();
     out.rho += nu / f * c_y.tail(N) * c_rho.transpose();
   }

@@ -12,6 +12,8 @@
 
 #include "core/linear/sparse_projection.hpp"
 #include "core/mechanism/row_laws.hpp"
+#include "core/start/nearest_point.hpp"
+#include "core/start/poses.hpp"
 
 namespace mbsopt {
 
@@ -27,7 +29,8 @@ struct AssemblyTarget {
   double branch = 0;  // of an angle: the last accepted value, from which it continues
 };
 
-class AssemblyEquations {
+// As a problem of the nearest point, the unknowns x are q, or v at a held q.
+class AssemblyEquations final : public NearestPointEquations {
  public:
   AssemblyEquations(const MechanismData& data, AssemblyLevel level, double t);
 
@@ -40,49 +43,58 @@ class AssemblyEquations {
   void set_angles(const Eigen::VectorXd& angles) { angles_ = angles; }
   void settle_shared_rows(const Eigen::VectorXd& y, Eigen::VectorXd& angles) const;
 
+  AssemblyLevel level() const { return level_; }
   Eigen::Index rows() const;  // joints first, then unit norms, then targets
   const std::vector<AssemblyTarget>& targets() const { return targets_; }
 
   // y = (q, v); the position level ignores v.
-  Eigen::VectorXd values(const Eigen::VectorXd& y) const;
+  Eigen::VectorXd values_at(const Eigen::VectorXd& y) const;
+  // The gradient in the state as entries, of which those at the same place add up, and that in the parameters unless
+  // rho is null: rows x 14n, rows x P (all parameters).
+  std::vector<SparseEntry> entries(const Eigen::VectorXd& y, Eigen::MatrixXd* rho = nullptr) const;
   struct Gradients {
-    Eigen::MatrixXd y, rho;  // rows x 14n, rows x P (all parameters)
+    Eigen::MatrixXd y, rho;
   };
   Gradients gradients(const Eigen::VectorXd& y) const;
-  Eigen::MatrixXd gradients_in_y(const Eigen::VectorXd& y) const;
-  // The same, with the gradient in the state as entries. Entries at the same place add up.
-  struct SparseGradients {
-    std::vector<SparseEntry> y;
-    Eigen::MatrixXd rho;
-  };
-  SparseGradients sparse_gradients(const Eigen::VectorXd& y) const;
   // The derivative of F_x'nu, with x = q at position level and x = v at velocity level.   7n x 14n, 7n x P
   Gradients second(const Eigen::VectorXd& y, const Eigen::VectorXd& nu) const;
 
+  void hold(const Eigen::VectorXd& q) { q_ = q; }  // for the unknowns v
+
+  Eigen::VectorXd values(const Eigen::VectorXd& x) const override { return values_at(state(x)); }
+  Eigen::MatrixXd jacobian(const Eigen::VectorXd& x) const override;
+  Eigen::MatrixXd curvature(const Eigen::VectorXd& x, const Eigen::VectorXd& nu) const override {
+    return second(state(x), nu).y.middleCols(first(x), x.size());
+  }
+  double step_fraction(const Eigen::VectorXd& step) const override;
+  Eigen::VectorXd retracted(const Eigen::VectorXd& x) const override;
+  // A length for r and 1 for p. The length is the root mean square of entries in p over those in r, in rows of J with
+  // both.
+  Eigen::VectorXd sizes(const Eigen::MatrixXd& J) const override;
+  // |J| x, where the largest entry of r and of p (or of their rates) replaces each entry of theirs.
+  Eigen::VectorXd magnitudes(const Eigen::VectorXd& x) const override;
   // If not all equations can be satisfied, bodies stay rigid: unit norms weigh a thousand times a metre or radian.
-  Eigen::VectorXd weights() const;
-
-  void continue_branches(const Eigen::VectorXd& y);
-
-  using Row = Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>>;  // a row of a matrix
+  Eigen::VectorXd weights() const override;
+  void accept(const Eigen::VectorXd& x) override;  // continues the branches of angles
 
  private:
+  template <class AddEntry, class AddField>
+  void for_joint_gradients(AssemblyLevel level, const BodiesAt& bodies, int only, AddEntry&& add,
+                           AddField&& add_field) const;
+  bool positions() const { return level_ == AssemblyLevel::position; }
+  Eigen::Index first(const Eigen::VectorXd& x) const { return positions() ? 0 : x.size(); }  // of the unknowns, in y
+  Eigen::VectorXd state(const Eigen::VectorXd& x) const;
+  // Calls f(row, column, value) for the entries of the Jacobian at x.
+  template <class F>
+  void for_jacobian(const Eigen::VectorXd& x, F&& f) const;
   Eigen::VectorXd branches(const AssemblyTarget& target) const;
   void add_target_curvature(const AssemblyTarget& target, const Eigen::VectorXd& y, double nu, Gradients& out) const;
-  template <class AddEntry, class AddField>
-  void collect_joints(AssemblyLevel level, const Eigen::VectorXd& y, int only, AddEntry&& add,
-                      AddField&& add_field) const;
-  template <class AddEntry>
-  void collect_gradients(const Eigen::VectorXd& y, AddEntry&& add, Eigen::MatrixXd* rho) const;
-  void add_law_gradients(Eigen::MatrixXd& rho) const;
-  double term_value(const Constraint& c, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) const;
-  void add_slot(int slot, const Eigen::Ref<const Eigen::VectorXd>& bar, Row rho_bar) const;
 
   const MechanismData& data_;
   AssemblyLevel level_;
   double t_;
   std::vector<AssemblyTarget> targets_;
-  Eigen::VectorXd angles_;
+  Eigen::VectorXd angles_, q_;
   RowLaws laws_;  // at t
 };
 

@@ -15,7 +15,7 @@
 #include "core/mechanism/planar_model.hpp"
 #include "core/projection/projection.hpp"
 #include "core/start/assembly.hpp"
-#include "core/start/assembly_problems.hpp"
+#include "core/start/assembly_equations.hpp"
 
 namespace mbsopt {
 
@@ -32,12 +32,12 @@ constexpr double kSame = 1e-6;  // distance of equal modes, relative to the size
 
 double size_of(const VectorXd& x) { return x.lpNorm<Eigen::Infinity>(); }
 
-// a times b
-Vector4d product(const Vector4d& a, const Vector4d& b) {
-  Vector4d c;
-  c << a(0) * b(0) - a.tail<3>().dot(b.tail<3>()),
-      a(0) * b.tail<3>() + b(0) * a.tail<3>() + Vector3d(a.tail<3>()).cross(Vector3d(b.tail<3>()));
-  return c;
+// a times b, of numbers or of expressions
+template <class Q>
+Q product(const Q& a, const Q& b) {
+  return Q{
+      {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+       a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]}};
 }
 
 double distance(const VectorXd& a, const VectorXd& b) {
@@ -58,10 +58,10 @@ bool is_inside_out(const MechanismData& d, const VectorXd& first, const VectorXd
   };
   std::vector<int> products(d.joint_names.size(), 0);
   for (const Constraint& c : d.constraints)
-    if (c.joint >= 0 && std::holds_alternative<Dot1>(c.primitive)) ++products[static_cast<std::size_t>(c.joint)];
+    if (c.joint >= 0 && std::holds_alternative<Dot1>(c.primitive)) ++products[at(c.joint)];
   return std::ranges::any_of(d.constraints, [&](const Constraint& c) {
     const auto* const dot1 = std::get_if<Dot1>(&c.primitive);
-    if (!dot1 || c.joint < 0 || products[static_cast<std::size_t>(c.joint)] < 2) return false;
+    if (!dot1 || c.joint < 0 || products[at(c.joint)] < 2) return false;
     const auto seen = [&](const VectorXd& at) -> Vector3d {  // from body 1
       return axes(at, c.body1).transpose() * (axes(at, c.body2) * dot1->s2);
     };
@@ -85,7 +85,7 @@ class RandomTurns {
         turn << std::sqrt(1 - u) * std::sin(a), std::sqrt(1 - u) * std::cos(a), std::sqrt(u) * std::sin(b),
             std::sqrt(u) * std::cos(b);
       }
-      q.segment<4>(i + 3) = product(turn, q.segment<4>(i + 3));
+      q.segment<4>(i + 3) = product(turn, Vector4d(q.segment<4>(i + 3)));
     }
     return q;
   }
@@ -98,11 +98,6 @@ class RandomTurns {
 };
 
 using Quaternion = std::array<Expression, 4>;
-
-Quaternion product(const Quaternion& a, const Quaternion& b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-}
 
 Expression of(const std::string& function, const Expression& x) {
   return Expression::parse(function + "(" + x.text() + ")");
@@ -153,15 +148,14 @@ std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, c
   for (int k = 1, fruitless = 0; k < kMost && fruitless < kFruitless; ++k) {
     if (go_on && !go_on()) break;
     AssemblyEquations equations(d, AssemblyLevel::position, t);
-    AssemblyProblem positions(equations);
     VectorXd y = VectorXd::Zero(2 * guess.size());
     y.head(guess.size()) = turns.of(guess);
     equations.start_branches(y);
     ++fruitless;
     if (projector->approach(t, equations.angles(), y, theta_bar, rho_bar) > kOpen * (1 + size_of(y))) continue;
-    NearestPoint found = nearest_point(positions, y.head(guess.size()), d.assembly_iterations);
+    NearestPoint found = nearest_point(equations, y.head(guess.size()), d.assembly_iterations);
     if (found.status != NearestPointStatus::found) continue;
-    if (!found.determined) linearise(positions, found);
+    if (!found.determined) linearise(equations, found);
     if (!found.determined && found.linearisation.rank() < found.x.size()) continue;
     if (!modes.empty() && is_inside_out(d, modes[0].q, found.x)) {
       --fruitless;
@@ -190,8 +184,7 @@ void set_guess(Scene& scene, const Mechanism& mechanism, const AssemblyMode& mod
       Field& x = body.position[static_cast<std::size_t>(i)];
       x = x.is_number() ? Field(r(i)) : Field(x + Expression(r(i) - r0(i)));
     }
-    Vector4d inverse = p0;
-    inverse.tail<3>() *= -1;
+    const Vector4d inverse(p0(0), -p0(1), -p0(2), -p0(3));
     body.orientation = turned(body.orientation, product(p, inverse));
   }
 }

@@ -1,9 +1,11 @@
 #include "core/start/assembly_report.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "core/constraint/constraint.hpp"
@@ -12,18 +14,13 @@ namespace mbsopt {
 namespace {
 
 struct Finding {
+  std::string name;
   double amount;
-  std::string text;
+  std::string text;  // what the message says of it
 };
 
-std::string joint_name(const MechanismData& d, const Constraint& c) {
-  auto name = [&](int body) { return d.body_names[static_cast<std::size_t>(body)]; };
-  return "joint '" + d.joint_names[static_cast<std::size_t>(c.joint)] + "' (" + name(c.body1) + " - " + name(c.body2) +
-         ")";
-}
-
-// Adds the violation of one joint: the distance of points, the deviation of directions from a right angle.
-void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eigen::VectorXd& F, double tolerance,
+// The violation of one joint: the distance of points, the deviation of directions from a right angle.
+void add_joint(const MechanismData& d, bool rates, int joint, const Eigen::VectorXd& F, double tolerance,
                std::vector<Finding>& findings) {
   double apart = 0, skew = 0, turned = 0;
   const Constraint* any = nullptr;
@@ -35,8 +32,7 @@ void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eig
     double& kind = quantity == RowQuantity::cosine ? skew : quantity == RowQuantity::angle ? turned : apart;
     kind = quantity == RowQuantity::angle ? amount : std::hypot(kind, amount);
   }
-  if (!any || std::max({apart, skew, turned}) <= tolerance) return;
-  const bool rates = level == AssemblyLevel::velocity;
+  if (!any) return;
   std::vector<std::string> parts;
   if (apart > tolerance) parts.push_back(fmt::format("points {:.3g} {} apart", apart, rates ? "m/s" : "m"));
   if (skew > tolerance) {
@@ -44,55 +40,59 @@ void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eig
                           : fmt::format("axes {:.3g} rad out of line", std::asin(std::min(1.0, skew))));
   }
   if (turned > tolerance) parts.push_back(fmt::format("angles off by {:.3g} {}", turned, rates ? "rad/s" : "rad"));
-  std::string text = joint_name(d, *any) + ": " + parts[0];
-  for (std::size_t i = 1; i < parts.size(); ++i) text += ", " + parts[i];
-  findings.push_back({std::max({apart, skew, turned}), text});
+  const std::string name = fmt::format("joint '{}' ({} - {})", d.joint_names[at(joint)], d.body_names[at(any->body1)],
+                                       d.body_names[at(any->body2)]);
+  const bool finite = std::isfinite(apart + skew + turned);
+  findings.push_back(
+      {name, finite ? std::max({apart, skew, turned}) : NAN, fmt::format("{}: {}", name, fmt::join(parts, ", "))});
 }
 
-// The drives, conditions and joints whose rows have no number.
-std::vector<std::string> not_finite(const MechanismData& d, const AssemblyEquations& equations,
-                                    const Eigen::VectorXd& F) {
-  std::vector<std::string> names;
-  const auto add = [&](const std::string& name) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  };
-  for (const Constraint& c : d.constraints) {
-    if (std::isfinite(F.segment(c.row, c.rows()).squaredNorm())) continue;
-    add(c.drive >= 0 ? "drive '" + d.drive_names[static_cast<std::size_t>(c.drive)] + "'" : joint_name(d, c));
-  }
-  Eigen::Index row = d.m + d.n;
-  for (const AssemblyTarget& target : equations.targets()) {
-    const ConditionData& condition = d.conditions[static_cast<std::size_t>(target.condition)];
-    if (!std::isfinite(F(row++)))
-      add("the condition of '" + d.sensor_names[static_cast<std::size_t>(condition.sensor)] + "'");
-  }
-  if (names.empty()) names.emplace_back("a body's orientation");
-  return names;
-}
-
-void add_drive(const MechanismData& d, AssemblyLevel level, const Constraint& c, const Eigen::VectorXd& F,
-               double tolerance, std::vector<Finding>& findings) {
+void add_drive(const MechanismData& d, bool rates, const Constraint& c, const Eigen::VectorXd& F,
+               std::vector<Finding>& findings) {
   const double amount = std::abs(F(c.row));
-  if (amount <= tolerance) return;
   const RowQuantity quantity = c.quantity();
   const std::string unit = quantity == RowQuantity::angle ? " rad" : quantity == RowQuantity::length ? " m" : "";
+  const std::string name = "drive '" + d.drive_names[at(c.drive)] + "'";
   findings.push_back(
-      {amount, fmt::format("drive '{}': missed by {:.3g}{}{}", d.drive_names[static_cast<std::size_t>(c.drive)], amount,
-                           unit, level == AssemblyLevel::velocity ? " per second" : "")});
+      {name, amount, fmt::format("{}: missed by {:.3g}{}{}", name, amount, unit, rates ? " per second" : "")});
+}
+
+void add_condition(const MechanismData& d, bool rates, const AssemblyTarget& target, double off,
+                   std::vector<Finding>& findings) {
+  // The norm of a velocity has no direction in which it could grow from rest.
+  const bool at_rest = !target.sensor->components().empty() && std::abs(target.value + off) < 1e-12;
+  const ConditionData& c = d.conditions[at(target.condition)];
+  const std::string &unit = rates && !c.velocity_level ? c.rate_unit : c.unit, &sensor = d.sensor_names[at(c.sensor)];
+  findings.push_back({"the condition of '" + sensor + "'", std::abs(off),
+                      fmt::format("condition on '{}': asks for {}{:.3g}{}, nearest possible {:.3g}{}{}", sensor,
+                                  c.has_rate && rates ? "rate " : "", target.value, unit, target.value + off, unit,
+                                  at_rest ? " (from a guess at rest; give a velocity of the body)" : "")});
 }
 
 }  // namespace
 
-std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const AssemblyEquations& equations,
-                             const NearestPoint& found) {
-  const bool positions = level == AssemblyLevel::position;
+std::string assembly_failure(const MechanismData& d, const AssemblyEquations& equations, const NearestPoint& found) {
+  const bool positions = equations.level() == AssemblyLevel::position;
   const std::string head = positions ? "initial assembly failed: " : "initial velocities failed: ";
-  if (!std::isfinite(found.F.squaredNorm()))
-    return head + "the equations are not finite at the guess: " +
-           fmt::format("{}", fmt::join(not_finite(d, equations, found.F), ", ")) +
-           ". Look at the laws of drives and the values of conditions (a root, logarithm or division outside its "
-           "range), "
-           "and at lengths and positions beyond all measure";
+  const Eigen::VectorXd& F = found.F;
+  const double tolerance = std::max(1e-9, 1e-3 * F.lpNorm<Eigen::Infinity>());
+  std::vector<Finding> findings;
+  for (std::size_t j = 0; j < d.joint_names.size(); ++j)
+    add_joint(d, !positions, static_cast<int>(j), F, tolerance, findings);
+  for (const Constraint& c : d.constraints)
+    if (c.drive >= 0) add_drive(d, !positions, c, F, findings);
+  Eigen::Index row = d.m + d.n;
+  for (const AssemblyTarget& target : equations.targets()) add_condition(d, !positions, target, F(row++), findings);
+  if (!std::isfinite(F.squaredNorm())) {
+    std::vector<std::string> names;
+    for (const Finding& f : findings)
+      if (!std::isfinite(f.amount)) names.push_back(f.name);
+    if (names.empty()) names.emplace_back("a body's orientation");
+    return fmt::format(
+        "{}the equations are not finite at the guess: {}. Look at the laws of drives and the values of conditions (a "
+        "root, logarithm or division outside its range), and at lengths and positions beyond all measure",
+        head, fmt::join(names, ", "));
+  }
   if (found.status == NearestPointStatus::undetermined) {
     return head +
            "several initial states are equally near to the guess; move the guess (position, orientation of the "
@@ -103,35 +103,12 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
            "the search ends at a singular position (as with all bars in line), where several motions branch off; move "
            "the guess (position, orientation of the bodies) away from it, or fix the branch by initial.conditions";
   }
-  const Eigen::VectorXd& F = found.F;
-  const double tolerance = std::max(1e-9, 1e-3 * F.lpNorm<Eigen::Infinity>());
-  std::vector<Finding> findings;
-  for (std::size_t j = 0; j < d.joint_names.size(); ++j) {
-    add_joint(d, level, static_cast<int>(j), F, tolerance, findings);
-  }
-  for (const Constraint& c : d.constraints) {
-    if (c.drive >= 0) add_drive(d, level, c, F, tolerance, findings);
-  }
-  Eigen::Index row = d.m + d.n;
-  for (const AssemblyTarget& target : equations.targets()) {
-    const double off = F(row++);
-    if (!(std::abs(off) > tolerance)) continue;
-    // The norm of a velocity has no direction in which it could grow from rest.
-    const bool at_rest = !target.sensor->components().empty() && std::abs(target.value + off) < 1e-12;
-    const ConditionData& c = d.conditions[static_cast<std::size_t>(target.condition)];
-    const std::string& unit = positions || c.velocity_level ? c.unit : c.rate_unit;
-    findings.push_back(
-        {std::abs(off), fmt::format("condition on '{}': asks for {}{:.3g}{}, nearest possible {:.3g}{}{}",
-                                    d.sensor_names[static_cast<std::size_t>(c.sensor)],
-                                    c.has_rate && !positions ? "rate " : "", target.value, unit, target.value + off,
-                                    unit, at_rest ? " (from a guess at rest; give a velocity of the body)" : "")});
-  }
+  std::erase_if(findings, [&](const Finding& f) { return !(f.amount > tolerance); });
   if (findings.empty()) {
     return head + "no convergence after " + std::to_string(found.iterations) +
            " iterations; give a guess (position, orientation of the bodies) nearer to the initial state";
   }
-  std::stable_sort(findings.begin(), findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.amount > b.amount; });
+  std::ranges::stable_sort(findings, std::ranges::greater(), &Finding::amount);
   constexpr std::size_t kShown = 8;
   std::string text = head;
   for (std::size_t i = 0; i < std::min(kShown, findings.size()); ++i) text += (i ? "; " : "") + findings[i].text;

@@ -8,7 +8,6 @@
 
 namespace mbsopt {
 
-std::string assembly_failure(const MechanismData& data, AssemblyLevel level, const AssemblyEquations& equations,
-                             const NearestPoint& found);
+std::string assembly_failure(const MechanismData& data, const AssemblyEquations& equations, const NearestPoint& found);
 
 }  // namespace mbsopt

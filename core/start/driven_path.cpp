@@ -63,8 +63,7 @@ std::string past_half_turn(const MechanismData& d, const Eigen::VectorXd& before
         "forces[{}], the bushing between '{}' and '{}', is turned by {:.4g} rad at t = {:.6g} s: at half a turn its "
         "torque jumps from one side to the other. Keep it below (a stop, stiffer or damped rubber, a slower start), or "
         "take a joint with an rsda, which counts turns",
-        b.force, d.body_names[static_cast<std::size_t>(b.body1)], d.body_names[static_cast<std::size_t>(b.body2)],
-        angle, t);
+        b.force, d.body_names[at(b.body1)], d.body_names[at(b.body2)], angle, t);
   }
   return {};
 }
@@ -91,8 +90,6 @@ void DrivenPath::start(double t, double end, const Eigen::VectorXd& y, const Eig
   const SingularWindow* const w = window_at(t);
   state_ = w ? w->state_at(t) : before_;
 }
-
-void DrivenPath::improve(const Eigen::VectorXd& y) { state_.y = y; }
 
 double DrivenPath::step_limit() const {
   double fastest = 0;
@@ -152,15 +149,16 @@ bool DrivenPath::step(double h, double t1) {
   return true;
 }
 
-bool DrivenPath::go_to(double t1, double shortest, long most) {
+bool DrivenPath::go_to(double t1, double shortest, long most, const std::function<bool()>& goes_on) {
   double h = t1 - state_.t;
   const long last_step = steps_ + most;
   while (state_.t < t1) {
-    if (steps_ >= last_step) return false;
+    if (steps_ >= last_step || (goes_on && !goes_on())) return false;
     const double left = t1 - state_.t;
     h = std::min({h, left, step_limit()});
     const bool last = h >= left * (1 - 1e-12);
     if (advance(h, last ? t1 : state_.t + h)) {
+      ++accepted_;
       h *= 2;
     } else {
       h /= 2;

@@ -5,17 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <limits>
 
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
-#include "core/dynamics/spatial_dynamics.hpp"
+#include "core/dynamics/acceleration_tangents.hpp"
 #include "core/expression/time_parts.hpp"
 #include "core/force/forces.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/followed_angles.hpp"
 #include "core/projection/projection.hpp"
-#include "core/start/assembly_problems.hpp"
+#include "core/start/assembly_equations.hpp"
 
 namespace mbsopt {
 namespace {
@@ -24,19 +23,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostIterations = 5000;        // chains that slide along stiff stops take some hundreds
-constexpr double kLargestStep = 0.2;         // of a coordinate at once [lengths of the mechanism, rad]
-constexpr double kApart = 0.05;              // the places along a step at which forces are computed [the same]
-constexpr double kNearPlaces = 1e-3;         // of a step: places as near to each other are one
-constexpr double kBeside = 1e-5;             // from the equilibrium, to see where the forces drive it [the same]
-constexpr double kAtKink = 1e-7;             // an equilibrium as near to a kink is at it [the same]
-constexpr double kLeastKink = 1e-6;          // of the change of forces over this distance, whose rounding is 1e-8
-constexpr double kRestRankThreshold = 1e-8;  // rows of J scaled to unit length
-constexpr double kTolerance = 1e-11;         // of the last Newton step [lengths of the mechanism, rad]
-constexpr double kRounding = 1e-14;          // of the terms of a force: a few additions
-constexpr double kLargestError = 0.5;        // of a step, relative to it: the linear equations predict the rest
-constexpr double kAimedError = 0.25;         // the next step has about this one
-constexpr double kFastest = 0.02;            // of sigma: its largest change from a step to the next
+constexpr int kMostIterations = 5000;  // chains that slide along stiff stops take some hundreds
+constexpr double kLargestStep = 0.2;   // of a coordinate at once [lengths of the mechanism, rad]
+constexpr double kApart = 0.05;        // the places along a step at which forces are computed [the same]
+constexpr double kNearPlaces = 1e-3;   // of a step: places as near to each other are one
+constexpr double kBeside = 1e-5;       // from the equilibrium, to see where the forces drive it [the same]
+constexpr double kAtKink = 1e-7;       // an equilibrium as near to a kink is at it [the same]
+constexpr double kLeastKink = 1e-6;    // of the change of forces over this distance, whose rounding is 1e-8
+constexpr double kTolerance = 1e-11;   // of the last Newton step [lengths of the mechanism, rad]
+constexpr double kRounding = 1e-14;    // of the terms of a force: a few additions
+constexpr double kLargestError = 0.5;  // of a step, relative to it: the linear equations predict the rest
+constexpr double kAimedError = 0.25;   // the next step has about this one
+constexpr double kFastest = 0.02;      // of sigma: its largest change from a step to the next
 
 class Statics {
  public:
@@ -47,7 +45,6 @@ class Statics {
         layout_{d_.n},
         dynamics_(mechanism, FormulationSettings{}),
         projector_(make_projector(mechanism, Projection::position_velocity)),
-        equations_(d_, AssemblyLevel::position, t),
         angles_(angles),
         ydot_(layout_.size()) {
     dynamics_.terms().hold_laws();
@@ -58,56 +55,25 @@ class Statics {
     y_ = at_rest_in(q);
     if (!dynamics_.evaluate(t_, y_, angles_, ydot_)) return false;
     dynamics_.linearise_here();
-    z_.resize(freedoms_);
-    Index row = 0;
-    for (const Vec<6>& z : dynamics_.z()) z_.segment<6>(row) = z, row += 6;
+    z_ = flat(dynamics_.z());
     return z_.allFinite();
   }
 
   // Tangents of z: along the columns of xi, and in the parameters.
   MatrixXd z_along(const MatrixXd& xi) {
-    const MatrixXd directions = rates_of_poses(y_.head(layout_.positions()), xi);
-    MatrixXd out(freedoms_, xi.cols());
-    const ParameterBlock none = block_without_parameters(d_);
-    LaneRows y_dir = LaneRows::Zero(layout_.size(), kLanes), ydot_dir(layout_.size(), kLanes);
-    for (Index first = 0; first < xi.cols(); first += kLanes) {
-      const Index lanes = std::min<Index>(kLanes, xi.cols() - first);
-      y_dir.topLeftCorner(layout_.positions(), lanes) = directions.middleCols(first, lanes);
-      dynamics_.tangent(none, y_dir, ydot_dir);
-      Index row = 0;
-      for (const Lanes<6>& z : dynamics_.z_tangent()) out.block(row, first, 6, lanes) = z.leftCols(lanes), row += 6;
-    }
-    return out;
+    MatrixXd directions = MatrixXd::Zero(layout_.size(), xi.cols());
+    directions.topRows(layout_.positions()) = rates_of_poses(y_.head(layout_.positions()), xi);
+    return acceleration_tangents(dynamics_, directions, Accelerations::z);
   }
-  MatrixXd z_of_parameters() {
-    MatrixXd out = MatrixXd::Zero(freedoms_, d_.rho.size());
-    const LaneRows y_dir = LaneRows::Zero(layout_.size(), kLanes);
-    LaneRows ydot_dir(layout_.size(), kLanes);
-    for (const ParameterBlock& block : parameter_blocks(d_)) {
-      dynamics_.tangent(block, y_dir, ydot_dir);
-      for (int lane = 0; lane < kLanes; ++lane) {
-        if (block.parameter[lane] < 0) continue;
-        Index row = 0;
-        for (const Lanes<6>& z : dynamics_.z_tangent()) {
-          out.col(block.parameter[lane]).segment<6>(row) = z.col(lane), row += 6;
-        }
-      }
-    }
-    return out;
-  }
+  MatrixXd z_of_parameters() { return acceleration_of_parameters(dynamics_, Accelerations::z); }
 
   // A basis of the motions xi that joints and drives leave free: J xi = 0.
-  MatrixXd free_motions() {
-    if (d_.m == 0) return MatrixXd::Identity(freedoms_, freedoms_);
-    return null_space(unit_rows(), kRestRankThreshold);
-  }
+  MatrixXd free_motions() const { return null_space(unit_rows(d_, BodiesAt(y_).frames).J, UnitRows::kRankThreshold); }
   // xi_p': the motion with the parameters that the joints ask for. J xi_p' = -Phi_rho
-  MatrixXd motion_of_parameters() {
-    if (d_.m == 0) return MatrixXd::Zero(freedoms_, d_.rho.size());
-    equations_.start_branches(y_);
-    const MatrixXd phi_rho = equations_.gradients(y_).rho.topRows(d_.m);
-    const OrthogonalDecomposition J(unit_rows(), kRestRankThreshold);
-    return J.solve(scale_.asDiagonal() * -phi_rho);
+  MatrixXd motion_of_parameters() const {
+    AssemblyEquations equations(d_, AssemblyLevel::position, t_);
+    equations.start_branches(y_);
+    return JointSolver(d_, BodiesAt(y_).frames).solve(-equations.gradients(y_).rho.topRows(d_.m));
   }
 
   MatrixXd mass_times(const MatrixXd& x) const {
@@ -133,11 +99,7 @@ class Statics {
   }
 
   const VectorXd& z() const { return z_; }
-  VectorXd loads() const {
-    VectorXd f(freedoms_);
-    for (Index k = 0; k < f.size(); k += 6) f.segment<6>(k) = dynamics_.loads()[static_cast<std::size_t>(k / 6)];
-    return f;
-  }
+  VectorXd loads() const { return flat(dynamics_.loads()); }
 
   const VectorXd& angles() const { return angles_; }
   void set_angles(const VectorXd& angles) { angles_ = angles; }
@@ -170,11 +132,9 @@ class Statics {
       for (const Program& component : f.components)
         add(component, [&](const VectorXd& y, std::vector<double>& of_law) {
           const int first = static_cast<int>(of_law.size()) + 1;  // sensor
-          of_law.resize(of_law.size() + 1 + static_cast<std::size_t>(mechanism_.sensors()), t_);
+          of_law.resize(of_law.size() + 1 + at(mechanism_.sensors()), t_);
           for (const int input : component.used_inputs())
-            if (input >= first)
-              of_law[static_cast<std::size_t>(input)] =
-                  mechanism_.sensor_value(input - first, {t_, y, angles_, nullptr});
+            if (input >= first) of_law[at(input)] = mechanism_.sensor_value(input - first, {t_, y, angles_, nullptr});
         });
     return places;
   }
@@ -208,13 +168,6 @@ class Statics {
   }
 
  private:
-  // J with rows of unit length; scale_ makes it from J.
-  MatrixXd unit_rows() {
-    const MatrixXd J = dynamics_.solver().rows().dense();
-    scale_ = J.rowwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
-    return scale_.asDiagonal() * J;
-  }
-
   // y = (q, 0)
   VectorXd at_rest_in(const VectorXd& q) const {
     VectorXd y = VectorXd::Zero(layout_.size());
@@ -245,8 +198,7 @@ class Statics {
   double length_ = 1;
   SpatialDynamics dynamics_;
   std::unique_ptr<Projector> projector_;
-  AssemblyEquations equations_;
-  VectorXd angles_, y_, ydot_, z_, scale_;
+  VectorXd angles_, y_, ydot_, z_;
 };
 
 // N'M (sigma I - Z) N y = N'M z at one position. N is orthonormal in M, so that sigma y is a force.
@@ -398,12 +350,11 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
   };
   if (const std::string why = go_downhill(statics, e.q, e.iterations); !why.empty()) return fail(why);
   if (!statics.evaluate(e.q)) return fail("the accelerations cannot be computed there");
-  const MatrixXd N = statics.free_motions(), particular = statics.motion_of_parameters();
-  MatrixXd xi_rho = particular;
-  if (N.cols() > 0) {
-    const MatrixXd NM = statics.mass_times(N).transpose();
-    const MatrixXd right = NM * (statics.z_of_parameters() + statics.z_along(particular));
-    xi_rho += N * OrthogonalDecomposition(-NM * statics.z_along(N)).solve(right);
+  const FreeMotion free(statics);
+  MatrixXd xi_rho = statics.motion_of_parameters();
+  if (free.N.cols() > 0) {
+    const MatrixXd right = free.NM * (statics.z_of_parameters() + statics.z_along(xi_rho));
+    xi_rho += free.N * free.damped(0).solve(right);
   }
   e.q_rho = rates_of_poses(e.q, xi_rho);
   e.angles = statics.angles();

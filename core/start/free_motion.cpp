@@ -20,16 +20,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numeric>
 
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
-#include "core/dynamics/constraint_rows.hpp"
 #include "core/expression/counted.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
-#include "core/start/assembly_equations.hpp"
+#include "core/start/nearest_point_linearisation.hpp"
+#include "core/start/poses.hpp"
 
 namespace mbsopt {
 namespace {
@@ -38,10 +36,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostBodies = 40;          // dense decompositions of 6n columns stay within milliseconds
-constexpr double kFreeThreshold = 1e-8;  // as for redundant rows
-constexpr double kStep = 1e-3;  // to the position near by [rad]: far above kZero, and within reach of Newton's steps
-constexpr double kZero = 1e-6;  // of a motion's size: above the rounding of a null vector
+constexpr int kMostBodies = 40;    // dense decompositions of 6n columns stay within milliseconds
+constexpr double kStep = 1e-3;     // to the position near by [rad]: far above kZero, and within reach of Newton's steps
+constexpr double kClosed = 1e-12;  // |Phi| there [m, rad]: rounding
+constexpr double kZero = 1e-6;     // of a motion's size: above the rounding of a null vector
 constexpr std::size_t kMostNames = 8;  // in one sentence
 
 struct JointPoint {
@@ -52,10 +50,11 @@ struct JointPoint {
 class MotionNames {
  public:
   MotionNames(const MechanismData& data, const VectorXd& y)
-      : d_(data), layout_{data.n}, frames_(at(data.n) + 1), points_(frames_.size()) {
-    BodyState state;
-    for (std::size_t k = 1; k < frames_.size(); ++k) set_position(y.segment<7>(layout_.q(k)), state, frames_[k]);
-    set_jacobian();
+      : d_(data),
+        layout_{data.n},
+        frames_(BodiesAt(y).frames),
+        points_(frames_.size()),
+        J_(unit_rows(data, frames_).J) {
     for (const Constraint& c : d_.constraints) add_points(c);
   }
 
@@ -81,23 +80,19 @@ class MotionNames {
 
   // d(q)/d(s) along a general motion of all groups: at most one radian, or one metre if nothing turns.
   VectorXd general_motion(const VectorXd& y) const {
-    VectorXd qdot = VectorXd::Zero(layout_.positions());
+    VectorXd xi = VectorXd::Zero(6 * layout_.n);
     double fastest = 0, turning = 0;
     for (const std::vector<int>& group : groups()) {
       const MatrixXd N = free_in(columns_of(group));
       const VectorXd weights = VectorXd::LinSpaced(N.cols(), 1, 2), motion = N * weights;
       for (std::size_t k = 0; k < group.size(); ++k) {
-        const Index q = layout_.q(group[k]);
-        const Vector3d v = motion.segment<3>(6 * static_cast<Index>(k)),
-                       omega = motion.segment<3>(6 * static_cast<Index>(k) + 3), e = y.segment<3>(q + 4);
-        qdot.segment<3>(q) = v;
-        qdot(q + 3) = -0.5 * e.dot(omega);  // pdot = 1/2 G(p)'omega
-        qdot.segment<3>(q + 4) = 0.5 * (y(q + 3) * omega + e.cross(omega));
-        fastest = std::max(fastest, v.norm()), turning = std::max(turning, omega.norm());
+        const Vec<6> of_body = motion.segment<6>(6 * static_cast<Index>(k));
+        xi.segment<6>(layout_.z(group[k])) = of_body;
+        fastest = std::max(fastest, of_body.head<3>().norm()), turning = std::max(turning, of_body.tail<3>().norm());
       }
     }
     const double size = turning > kZero * fastest ? turning : fastest;
-    return size > 0 ? VectorXd(qdot / size) : qdot;
+    return rates_of_poses(y.head(layout_.positions()), size > 0 ? VectorXd(xi / size) : xi);
   }
 
  private:
@@ -131,7 +126,7 @@ class MotionNames {
 
   // Rows of J have unit length.
   static MatrixXd without_rounding(const MatrixXd& A) {
-    return (A.array().abs() < kFreeThreshold).select(MatrixXd::Zero(A.rows(), A.cols()), A);
+    return (A.array().abs() < UnitRows::kRankThreshold).select(MatrixXd::Zero(A.rows(), A.cols()), A);
   }
 
   // The space that the columns span: a line, a plane or all.
@@ -140,16 +135,6 @@ class MotionNames {
     if (normals.cols() == 0) return fmt::format("every {}", what);
     if (normals.cols() == 1) return fmt::format("every {} normal to {}", what, direction(normals.col(0)));
     return direction(Vector3d(normals.col(0)).cross(Vector3d(normals.col(1))));
-  }
-
-  void set_jacobian() {
-    ConstraintRows rows(d_);
-    rows.evaluate(frames_);
-    J_ = rows.dense();
-    for (Index r = 0; r < J_.rows(); ++r) {
-      const double length = J_.row(r).norm();
-      if (length > 0) J_.row(r) /= length;
-    }
   }
 
   // Collects the points where joints touch their bodies.
@@ -166,26 +151,18 @@ class MotionNames {
         c.primitive);
   }
 
+  // The bodies that rows join, directly or by others.
   std::vector<std::vector<int>> groups() const {
-    std::vector<int> parent(at(d_.n) + 1);
-    std::iota(parent.begin(), parent.end(), 0);
-    const auto root = [&](int i) {
-      while (parent[at(i)] != i) i = parent[at(i)];
-      return i;
-    };
-    std::map<int, int> of_row;  // a body in each row
-    for (const Constraint& c : d_.constraints) {
-      for (const int body : {c.body1, c.body2}) {
-        if (body == 0) continue;
-        const auto [entry, is_new] = of_row.emplace(c.row, body);
-        parent[at(root(body))] = root(entry->second);
-      }
+    MatrixXd touches = MatrixXd::Zero(d_.m, d_.n);
+    for (const Constraint& c : d_.constraints)
+      for (const int body : {c.body1, c.body2})
+        if (body > 0) touches(c.row, body - 1) = 1;
+    std::vector<std::vector<int>> groups;
+    for (const JoinedPart& part : joined_parts(touches)) {
+      groups.emplace_back();
+      for (const Index k : part.unknowns) groups.back().push_back(static_cast<int>(k) + 1);
     }
-    std::map<int, std::vector<int>> all;
-    for (int i = 1; i <= d_.n; ++i) all[root(i)].push_back(i);
-    std::vector<std::vector<int>> result;
-    for (auto& [body, group] : all) result.push_back(std::move(group));
-    return result;
+    return groups;
   }
 
   MatrixXd columns_of(const std::vector<int>& bodies) const {
@@ -196,7 +173,7 @@ class MotionNames {
   }
   static MatrixXd free_in(const MatrixXd& J) {
     if (J.size() == 0 || J.isZero(0)) return MatrixXd::Identity(J.cols(), J.cols());
-    return null_space(J, kFreeThreshold);
+    return null_space(J, UnitRows::kRankThreshold);
   }
 
   void add_group(const std::vector<int>& group) {
@@ -288,22 +265,6 @@ class MotionNames {
   Sentences sentences_;
 };
 
-// Takes Newton steps of least length onto the joints and unit norms with drives held. Returns whether they converge.
-bool close_again(const MechanismData& data, double time, VectorXd& y) {
-  constexpr int kSteps = 6;
-  constexpr double kClosed = 1e-12;  // [m], 1: rounding
-  AssemblyEquations equations(data, AssemblyLevel::position, time);
-  equations.start_branches(y);
-  const Index rows = data.m + data.n, N = StateLayout{data.n}.positions();
-  for (int i = 0; i < kSteps; ++i) {
-    const VectorXd F = equations.values(y).head(rows);
-    if (F.lpNorm<Eigen::Infinity>() < kClosed) return true;
-    const MatrixXd J = equations.gradients(y).y.topLeftCorner(rows, N);
-    y.head(N) -= OrthogonalDecomposition(J, kFreeThreshold).solve(F);
-  }
-  return equations.values(y).head(rows).lpNorm<Eigen::Infinity>() < kClosed;
-}
-
 }  // namespace
 
 std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly& assembly, double start_time,
@@ -314,7 +275,7 @@ std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly
   MotionNames here(data, y);
   VectorXd moved = y;
   moved.head(StateLayout{data.n}.positions()) += kStep * here.general_motion(y);
-  if (!close_again(data, start_time, moved)) return {};
+  if (close_joints(data, start_time, assembly.result().angles, UnitRows::kRankThreshold, moved) > kClosed) return {};
   const MotionNames::Sentences at_start = here.sentences(), near_by = MotionNames(data, moved).sentences();
   if (at_start.all != degrees_of_freedom || near_by.all != degrees_of_freedom) return {};
   // A user knows the axes at the start, so these are named.

@@ -39,8 +39,11 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
                                   const std::function<bool(std::size_t, const StatePoint&)>& observe,
                                   const std::function<bool(double)>& go_on = {});
 
-// The singular position of a state, with half of its window.
-SingularPosition singular_position(const Mechanism& mechanism, double t, const Eigen::VectorXd& y, double half);
+// The singular position of a state, which the motion does not pass smoothly.
+SingularPosition singular_position(const Mechanism& mechanism, double t, const Eigen::VectorXd& y);
+// The entry of a window among the known ones, to which it is added if it is new.
+SingularPosition& singular_position(const Mechanism& mechanism, const SingularWindow& window,
+                                    std::vector<SingularPosition>& known);
 
 // The reason why the positions cannot be continued from a state at t, in words: a jump of a law, or the position.
 std::string why_stuck(const Mechanism& mechanism, const SimulationSettings& settings, double t,

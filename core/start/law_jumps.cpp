@@ -13,10 +13,6 @@ constexpr double kRoundingOfLaw = 1e-12;     // [m, rad, and these per s]: of 1 
 constexpr double kWide = 16, kSteep = 0.25;  // an interval, of the shortest; a change without jump falls by more
 constexpr double kPart = 0.471;              // not half: jumps are at round times, where a law may have no value
 
-std::string drive_of(const MechanismData& d, const RowLaw& law) {
-  return law.drive >= 0 ? d.drive_names[static_cast<std::size_t>(law.drive)] : "?";
-}
-
 }  // namespace
 
 LawJumps::LawJumps(const MechanismData& data)
@@ -64,21 +60,17 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Derivative what, double t0, do
 
 std::string LawJumps::between(double t0, double t1) {
   for (const RowLaw* law : laws_) {
-    const Jump f = find(law->law, Derivative::f, t0, t1);
-    if (f.size != 0) {
+    const std::string drive = law->drive >= 0 ? data_.drive_names[mbsopt::at(law->drive)] : "?";
+    if (const Jump f = find(law->law, Derivative::f, t0, t1); f.size != 0)
       return fmt::format(
           "the law of drive '{}' jumps by {:.3g} at t = {:.6g} s, which no motion follows. Let it pass smoothly, over "
-          "a "
-          "short time, from one value to the other",
-          drive_of(data_, *law), f.size, f.t);
-    }
-    const Jump f_t = find(law->law, Derivative::f_t, t0, t1);
-    if (f_t.size != 0) {
+          "a short time, from one value to the other",
+          drive, f.size, f.t);
+    if (const Jump f_t = find(law->law, Derivative::f_t, t0, t1); f_t.size != 0)
       return fmt::format(
           "the law of drive '{}' changes its rate by {:.3g} 1/s at once at t = {:.6g} s: an impact, whose force has no "
           "bounds. Let the rate change over a short time",
-          drive_of(data_, *law), f_t.size, f_t.t);
-    }
+          drive, f_t.size, f_t.t);
   }
   return {};
 }

@@ -21,8 +21,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kRankThreshold = 1e-8;  // of rows scaled to unit length, as for the rank of an equilibrium
-
 // The size of the mechanism: the largest distance of a centre of mass from the first one, or from the origin.
 double size_of(const VectorXd& y, int n) {
   const StateLayout layout{n};
@@ -53,8 +51,8 @@ FreeDirections free_directions(const MechanismData& d, const StatePoint& at, dou
     if (norm > 0) J.row(r) /= norm, J_dot.row(r) /= norm;
   }
   FreeDirections x;
-  x.N = null_space(J, kRankThreshold);
-  x.P = -OrthogonalDecomposition(J, kRankThreshold).solve(J_dot * x.N);
+  x.N = null_space(J, UnitRows::kRankThreshold);
+  x.P = -OrthogonalDecomposition(J, UnitRows::kRankThreshold).solve(J_dot * x.N);
   x.phi_rho = F.rho.topRows(rows).cwiseAbs() + G.rho.topRows(rows).cwiseAbs();
   return x;
 }

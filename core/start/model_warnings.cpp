@@ -21,30 +21,21 @@
 #include "core/mechanism/rounded_loops.hpp"
 #include "core/mechanism/sensor_gradient.hpp"
 #include "core/sensor/body_at.hpp"
-#include "core/start/assembly_problems.hpp"
+#include "core/start/poses.hpp"
 
 namespace mbsopt {
 namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kMassless = 1e-12;           // of an inertia about a principal axis, relative to the body's trace
-constexpr double kZeroLength = 1e-9;          // of the mechanism's length
-constexpr double kMuchViolated = 0.1;         // of the mechanism's size for points, rad for axes
-constexpr double kModelRankThreshold = 1e-8;  // rows of J scaled to unit length
+constexpr double kMassless = 1e-12;    // of an inertia about a principal axis, relative to the body's trace
+constexpr double kZeroLength = 1e-9;   // of the mechanism's length
+constexpr double kMuchViolated = 0.1;  // of the mechanism's size for points, rad for axes
 
-std::vector<Frame> frames_at(const MechanismData& d, const VectorXd& q) {
-  std::vector<Frame> frames(at(d.n) + 1);
-  BodyState state;
-  const StateLayout layout{d.n};
-  for (std::size_t k = 1; k < frames.size(); ++k) set_position(q.segment<7>(layout.q(k)), state, frames[k]);
-  return frames;
-}
-
-void add_jacobian(const MechanismData& d, const VectorXd& q, std::vector<SparseEntry>& rows) {
+void add_jacobian(const MechanismData& d, const VectorXd& y, std::vector<SparseEntry>& rows) {
   const StateLayout layout{d.n};
   ConstraintRows J(d);
-  J.evaluate(frames_at(d, q));
+  J.evaluate(BodiesAt(y).frames);
   for (const RowGroup& g : d.groups) {
     for (int r = 0; r < g.rows; ++r) {
       for (int k = 0; k < 6; ++k) {
@@ -57,7 +48,7 @@ void add_jacobian(const MechanismData& d, const VectorXd& q, std::vector<SparseE
 
 // Directions that neither a joint nor a mass holds: no row of J and no row of the masses, one per principal axis,
 // reaches them. For each body: whether it may turn, or only move.
-std::map<int, bool> massless_directions(const MechanismData& d, const VectorXd& q) {
+std::map<int, bool> massless_directions(const MechanismData& d, const VectorXd& y) {
   const StateLayout layout{d.n};
   std::vector<SparseEntry> rows;
   int count = d.m;
@@ -73,16 +64,16 @@ std::map<int, bool> massless_directions(const MechanismData& d, const VectorXd& 
     }
   }
   if (count == d.m + 6 * d.n) return {};  // the usual case costs nothing
-  add_jacobian(d, q, rows);
+  add_jacobian(d, y, rows);
   std::map<int, bool> bodies;
-  for (const RowDependence::Direction& free : row_dependence(count, d.n, 6, rows, kModelRankThreshold).unreached) {
+  for (const RowDependence::Direction& free : row_dependence(count, d.n, 6, rows, UnitRows::kRankThreshold).unreached) {
     bodies[free.body + 1] = free.column >= 3;
   }
   return bodies;
 }
 
-void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
-  for (const auto& [body, turns] : massless_directions(d, q)) {
+void add_massless(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
+  for (const auto& [body, turns] : massless_directions(d, y)) {
     warnings.push_back(
         fmt::format("body '{}' has no {} in a direction in which no joint holds it: forces there give no finite "
                     "acceleration; give it "
@@ -157,7 +148,7 @@ void add_reactions(const Mechanism& mechanism, const AssemblyResult& start, std:
     if (!sensor) continue;
     if (rank < 0) {
       add_jacobian(d, y, rows);
-      rank = row_dependence(d.m, d.n, 6, rows, kModelRankThreshold).rank;
+      rank = row_dependence(d.m, d.n, 6, rows, UnitRows::kRankThreshold).rank;
     }
     if (rank == d.m) return;
     if (d.planar && sensor->component == SensorFunction::kNorm && of_spin.isZero(0))
@@ -167,7 +158,7 @@ void add_reactions(const Mechanism& mechanism, const AssemblyResult& start, std:
     for (Eigen::Index k = 0; k < b.cols(); ++k)
       for (int r = 0; r < d.m; ++r)
         if (b(r, k) != 0) extended.push_back({r, 6 * d.n + static_cast<int>(k), b(r, k)});
-    if (row_dependence(d.m, d.n + 1, 6, extended, kModelRankThreshold).rank == rank) continue;
+    if (row_dependence(d.m, d.n + 1, 6, extended, UnitRows::kRankThreshold).rank == rank) continue;
     const std::string what =
         sensor->joint >= 0 ? fmt::format("the {} in joint '{}'", sensor->torque ? "reaction torque" : "reaction force",
                                          d.joint_names[at(sensor->joint)])
@@ -223,7 +214,7 @@ void add_axes(const MechanismData& d, std::vector<std::string>& warnings) {
 }
 
 // Coordinates r have a rounding of eps |r|, which counts against the arms of bodies.
-void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
+void add_rounding(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
   constexpr double kNoticeable = 1e-8;  // of the arms: below the tolerances of integrators
   double arm = 0, far = 0;
   for (const Constraint& c : d.constraints) {
@@ -232,7 +223,7 @@ void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::st
     });
   }
   const StateLayout layout{d.n};
-  for (int i = 1; i <= d.n; ++i) far = std::max(far, q.segment<3>(layout.q(i)).stableNorm());
+  for (int i = 1; i <= d.n; ++i) far = std::max(far, y.segment<3>(layout.q(i)).stableNorm());
   const double rounding = std::numeric_limits<double>::epsilon() * far;
   if (arm == 0 || !(rounding > kNoticeable * arm)) return;
   warnings.push_back(fmt::format(
@@ -277,7 +268,9 @@ void add_violations(const MechanismData& d, std::vector<std::string>& warnings) 
   for (const Constraint& c : d.constraints) {
     if (const auto* p = std::get_if<Coincidence>(&c.primitive)) size = std::max({size, p->s1.norm(), p->s2.norm()});
   }
-  const std::vector<Frame> frames = frames_at(d, position_guess(d));
+  VectorXd guess = VectorXd::Zero(StateLayout{d.n}.size());
+  guess.head(guess.size() / 2) = position_guess(d);
+  const std::vector<Frame> frames = BodiesAt(guess).frames;
   std::map<int, double> worst_point, worst_axis;
   for (const Constraint& c : d.constraints) {
     if (c.joint < 0) continue;
@@ -326,8 +319,7 @@ std::vector<int> massless_bodies(const Mechanism& mechanism, const Assembly& ass
 
 std::vector<int> massless_bodies(const MechanismData& data, const VectorXd& y) {
   std::vector<int> bodies;
-  for (const auto& [body, turns] : massless_directions(data, y.head(StateLayout{data.n}.positions())))
-    bodies.push_back(body);
+  for (const auto& [body, turns] : massless_directions(data, y)) bodies.push_back(body);
   return bodies;
 }
 
@@ -335,11 +327,11 @@ std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assemb
   const MechanismData& d = mechanism.data();
   std::vector<std::string> warnings;
   if (!assembly.result().ok) return warnings;
-  const VectorXd q = assembly.result().y.head(StateLayout{d.n}.positions());
+  const VectorXd& y = assembly.result().y;
   if (!d.rounded.joints.empty()) warnings.push_back(in_words(d));
-  add_rounding(d, q, warnings);
-  add_massless(d, q, warnings);
-  add_springs(d, assembly.result().y, warnings);
+  add_rounding(d, y, warnings);
+  add_massless(d, y, warnings);
+  add_springs(d, y, warnings);
   add_reactions(mechanism, assembly.result(), warnings);
   add_rounding_of_derivatives(assembly, warnings);
   for (std::string& warning : assembly.equilibrium_warnings()) warnings.push_back(std::move(warning));

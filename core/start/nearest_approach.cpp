@@ -6,7 +6,6 @@
 #include "core/mechanism/followed_angles.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/start/assembly_equations.hpp"
-#include "core/start/assembly_problems.hpp"
 
 namespace mbsopt {
 

@@ -8,6 +8,7 @@
 
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/start/poses.hpp"
 
 namespace mbsopt {
 
@@ -61,9 +62,8 @@ const Motion& ContinuedMotion::motion(const StatePoint& at) {
   Index k = 0;
   w->for_nodes(at.t, [&](double, const DrivenState& node) {
     motion_ = solved_.motion({node.t, node.y, node.angles});
-    const Eigen::Map<const Eigen::VectorXd> all(motion_.z.front().data(), 6 * static_cast<Index>(motion_.z.size()));
-    z.resize(all.size(), SingularWindow::kNodes), lambda.resize(motion_.lambda.size(), SingularWindow::kNodes);
-    z.col(k) = all, lambda.col(k++) = motion_.lambda;
+    z.resize(flat(motion_.z).size(), SingularWindow::kNodes), lambda.resize(motion_.lambda.size(), z.cols());
+    z.col(k) = flat(motion_.z), lambda.col(k++) = motion_.lambda;
     return true;
   });
   const SingularWindow::Weights weights = w->weights(at.t);
@@ -114,7 +114,7 @@ std::string in_words(const std::vector<SingularPosition>& positions, const std::
     owners.insert(s.owners.begin(), s.owners.end());
     lacking.insert(s.lacking.begin(), s.lacking.end());
     for (const int k : parameter_names.empty() ? std::vector<int>{} : s.parameters)
-      parameters.insert("'" + parameter_names[static_cast<std::size_t>(k)] + "'");
+      parameters.insert("'" + parameter_names[at(k)] + "'");
     half = std::max(half, s.half), is_rough = is_rough || s.half == 0;
   }
   if (count == 0) return {};

@@ -83,7 +83,7 @@ BodyMotion StateQuery::body(const std::string& name) const {
 
 PointMotion StateQuery::point(const std::string& name, const Eigen::Vector3d& in_body_frame) const {
   const BodyMotion m = body(name);
-  const Vector3d s = m.A * (in_body_frame - data_.bodies[static_cast<std::size_t>(number_of(data_, name))].com);
+  const Vector3d s = m.A * (in_body_frame - data_.bodies[at(number_of(data_, name))].com);
   return {m.r + s, m.rdot + m.omega.cross(s), m.rddot + m.omegadot.cross(s) + m.omega.cross(m.omega.cross(s))};
 }
 
@@ -92,8 +92,7 @@ Index StateQuery::index(const std::string& body) const { return StateLayout{data
 StateQuery::Rows StateQuery::rows(const std::string& name) const {
   Index first = data_.m, end = 0;
   for (const Constraint& c : data_.constraints) {
-    const std::string& owner = c.drive >= 0 ? data_.drive_names[static_cast<std::size_t>(c.drive)]
-                                            : data_.joint_names[static_cast<std::size_t>(c.joint)];
+    const std::string& owner = c.drive >= 0 ? data_.drive_names[at(c.drive)] : data_.joint_names[at(c.joint)];
     if (owner != name) continue;
     first = std::min<Index>(first, c.row), end = std::max<Index>(end, c.row + c.rows());
   }
@@ -102,8 +101,8 @@ StateQuery::Rows StateQuery::rows(const std::string& name) const {
 }
 
 // The conditions on sensors come last and are left out.
-VectorXd StateQuery::Phi() const { return equations_->position.values(y_).head(lambda_.size()); }
-VectorXd StateQuery::Phidot() const { return equations_->velocity.values(y_).head(lambda_.size()); }
+VectorXd StateQuery::Phi() const { return equations_->position.values_at(y_).head(lambda_.size()); }
+VectorXd StateQuery::Phidot() const { return equations_->velocity.values_at(y_).head(lambda_.size()); }
 MatrixXd StateQuery::Phi_q() const {
   return equations_->position.gradients(y_).y.topLeftCorner(lambda_.size(), a_.size());
 }
@@ -120,7 +119,7 @@ MatrixXd StateQuery::M() const {
   const StateLayout layout{data_.n};
   MatrixXd out = MatrixXd::Zero(a_.size(), a_.size());
   for (int i = 1; i <= data_.n; ++i) {
-    const BodyData& body = data_.bodies[static_cast<std::size_t>(i)];
+    const BodyData& body = data_.bodies[at(i)];
     const Mat<3, 4> G_p = G(y_.segment<4>(layout.p(i)));
     out.block<3, 3>(layout.q(i), layout.q(i)) = body.mass * Matrix3d::Identity();
     out.block<4, 4>(layout.p(i), layout.p(i)) = 4 * G_p.transpose() * body.J * G_p;
@@ -218,7 +217,7 @@ Scene starting_at(const Scene& scene, const Mechanism& mechanism, const VectorXd
   for (Body& body : out.bodies) {
     ++i;
     const Vector4d p = y.segment<4>(layout.p(i));
-    const Vector3d s = mbsopt::A(p) * data.bodies[static_cast<std::size_t>(i)].com;  // from the origin
+    const Vector3d s = mbsopt::A(p) * data.bodies[at(i)].com;  // from the origin
     const Vector3d omega = mbsopt::A(p) * (2 * G_times(p, Vector4d(y.segment<4>(layout.pdot(i)))));
     const Vector3d origin = y.segment<3>(layout.q(i)) - s, velocity = y.segment<3>(layout.v(i)) - omega.cross(s);
     body.position = {origin(0), origin(1), origin(2)};

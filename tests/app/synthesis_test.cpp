@@ -489,7 +489,7 @@ TEST_CASE("nearest approach: gradients of defects equal differences where the li
       AssemblyEquations equations(mechanism.data(), AssemblyLevel::position, step * k);
       equations.set_angles(approach.angles());
       const Eigen::Index m = mechanism.data().m;
-      const Eigen::VectorXd Phi = equations.values(approach.y()).head(m);
+      const Eigen::VectorXd Phi = equations.values_at(approach.y()).head(m);
       const Eigen::MatrixXd Phi_rho = equations.gradients(approach.y()).rho.topRows(m);
       tangent->row(k) = e(k) == 0 ? Eigen::RowVectorXd(Eigen::RowVectorXd::Zero(at.size()))
                                   : Phi.normalized().transpose() * Phi_rho / std::sqrt(static_cast<double>(m));

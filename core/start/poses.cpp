@@ -1,0 +1,83 @@
+#include "core/start/poses.hpp"
+
+#include <cmath>
+
+#include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
+#include "core/dynamics/constraint_rows.hpp"
+#include "core/dynamics/constraint_terms.hpp"
+
+namespace mbsopt {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+VectorXd position_guess(const MechanismData& d) {
+  const StateLayout layout{d.n};
+  VectorXd q(layout.positions());
+  for (std::size_t k = 1; k < d.bodies.size(); ++k) q.segment<7>(layout.q(k)) = d.bodies[k].q;
+  return q;
+}
+
+BodiesAt::BodiesAt(const VectorXd& y) {
+  const StateLayout layout = StateLayout::of(y);
+  states.resize(at(layout.n) + 1);
+  frames.resize(states.size());
+  for (std::size_t k = 1; k < states.size(); ++k) {
+    set_position(y.segment<7>(layout.q(k)), states[k], frames[k]);
+    set_velocity(y.segment<7>(layout.v(k)), states[k], frames[k]);
+  }
+}
+
+MatrixXd rates_of_poses(const VectorXd& q, const MatrixXd& xi) {
+  MatrixXd qdot(q.size(), xi.cols());
+  for (Index k = 0; k < xi.cols(); ++k) {
+    for (Index r = 0; r < q.size(); r += 7) {
+      const Vec<6> of_body = xi.col(k).segment<6>(r / 7 * 6);
+      qdot.col(k).segment<3>(r) = of_body.head<3>();
+      qdot.col(k).segment<4>(r + 3) = 0.5 * G_transposed_times(Vector4d(q.segment<4>(r + 3)), of_body.tail<3>());
+    }
+  }
+  return qdot;
+}
+
+UnitRows unit_rows(const MechanismData& data, const std::vector<Frame>& frames) {
+  ConstraintRows rows(data);
+  rows.evaluate(frames);
+  return UnitRows(rows.dense());
+}
+
+MatrixXd JointSolver::solve(const MatrixXd& b) const { return factor_.solve(rows_.scale.asDiagonal() * b); }
+VectorXd JointSolver::solve_transposed(const VectorXd& f) const {
+  return rows_.scale.cwiseProduct(VectorXd(factor_.solve_transposed(f)));
+}
+VectorXd JointSolver::transposed_times(const VectorXd& x) const {
+  return rows_.J.transpose() * x.cwiseQuotient(rows_.scale);
+}
+
+double close_joints(const MechanismData& d, double t, const VectorXd& angles, double threshold, VectorXd& y) {
+  constexpr int kMost = 10;
+  constexpr double kRounding = 1e-15;
+  const StateLayout layout{d.n};
+  RowLaws laws(d);
+  laws.set_time(t);
+  VectorXd phi(d.m);
+  double before = INFINITY;
+  for (int k = 0;; ++k) {
+    for (int i = 1; i <= d.n; ++i) {
+      auto p = y.segment<4>(layout.p(i)), pdot = y.segment<4>(layout.pdot(i));
+      p.normalize();
+      pdot -= p * p.dot(pdot);
+    }
+    const std::vector<Frame> frames = BodiesAt(y).frames;
+    ConstraintTerms(d).phi(frames, laws, angles, phi);
+    const double now = phi.size() > 0 ? phi.cwiseAbs().maxCoeff() : 0;
+    if (k == kMost || now < kRounding || !(now < 0.9 * before)) return now;
+    before = now;
+    auto q = y.head(layout.positions());
+    q += rates_of_poses(q, JointSolver(d, frames, threshold).solve(-phi));
+  }
+}
+
+}  // namespace mbsopt
