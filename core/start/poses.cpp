@@ -4,7 +4,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
-#include "core/dynamics/constraint_rows.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/dynamics/constraint_terms.hpp"
 
 namespace mbsopt {
@@ -43,9 +43,19 @@ MatrixXd rates_of_poses(const VectorXd& q, const MatrixXd& xi) {
 }
 
 UnitRows unit_rows(const MechanismData& data, const std::vector<Frame>& frames) {
-  ConstraintRows rows(data);
-  rows.evaluate(frames);
-  return UnitRows(rows.dense());
+  const StateLayout layout{data.n};
+  MatrixXd rows = MatrixXd::Zero(data.m, 6 * data.n);
+  for (const Constraint& c : data.constraints) {
+    std::visit(
+        [&]<class P>(const P& p) {
+          Mat<P::kRows, 6> J1, J2;
+          p.jacobian(frames[at(c.body1)], frames[at(c.body2)], J1, J2);
+          if (c.body1 > 0) rows.block<P::kRows, 6>(c.row, layout.z(c.body1)) += c.factor * J1;
+          if (c.body2 > 0) rows.block<P::kRows, 6>(c.row, layout.z(c.body2)) += c.factor * J2;
+        },
+        c.primitive);
+  }
+  return UnitRows(rows);
 }
 
 MatrixXd JointSolver::solve(const MatrixXd& b) const { return factor_.solve(rows_.scale.asDiagonal() * b); }
