@@ -46,13 +46,14 @@ double seconds_of_run(const Linkage& linkage, const std::string& model) {
   scene.simulation.integrator.step = 1e-3, scene.simulation.end_time = steps * 1e-3;
   const Mechanism mechanism(scene, Eigen::VectorXd(0));
   const Eigen::VectorXd y = start_of(linkage), angles;
-  RungeKuttaRun run(mechanism, scene.simulation, *runge_kutta_method(scene.simulation.integrator.type));
+  StepAttempt attempt(mechanism, scene.simulation, *runge_kutta_method(scene.simulation.integrator.type));
+  const RunOptions options;
   std::vector<double> seconds;
   for (int i = 0; i < 7; ++i) {
     SimulationResult result;
+    RungeKuttaRun run(attempt, {}, options, result);
     const ThreadClock clock;
-    run.run(
-        y, angles, [](double) { return false; }, {}, {}, result);
+    run.go(y, angles, {});
     seconds.push_back(clock.seconds() / static_cast<double>(result.statistics.rhs_evaluations));
   }
   return median(std::move(seconds));

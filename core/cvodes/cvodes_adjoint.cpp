@@ -9,6 +9,7 @@
 
 #include "core/body/state_layout.hpp"
 #include "core/cvodes/cvodes.hpp"
+#include "core/run/run_ends.hpp"
 
 namespace mbsopt::cvodes {
 namespace {
@@ -89,12 +90,11 @@ void Adjoint::take_step(const StatePoint& at) {
 }
 
 void Adjoint::begin() {
-  const double end = settings_.end_time;
-  const StatePoint at{end, run_.result().y_end, run_.flow().angles_at(end), run_.flow().motion()};
+  const StatePoint end = run_.end();
   for (Eigen::Index o = 0; o < objectives_; ++o) {
     const Cost& cost = costs_[static_cast<std::size_t>(o)];
     if (!cost.terminal) continue;
-    cost.terminal->add_gradient(at, 1, lambda_.col(o), mu_.col(o));
+    cost.terminal->add_gradient(end, 1, lambda_.col(o), mu_.col(o));
     source_(o) = std::max(source_(o), lambda_.col(o).cwiseAbs().maxCoeff());
   }
   source_ = source_.cwiseMax(running_source_);
@@ -135,20 +135,12 @@ bool Adjoint::evaluate(double t, N_Vector y, N_Vector lambda) {
   return true;
 }
 
-int Adjoint::lambda_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self) {
+template <Eigen::VectorXd Adjoint::*Rate>
+int Adjoint::rate(realtype t, N_Vector y, N_Vector lambda, N_Vector out, void* self) {
   Adjoint& adjoint = *static_cast<Adjoint*>(self);
   return adjoint.run_.flow().thrown().keep([&] {
     if (!adjoint.evaluate(t, y, lambda)) return kTryASmallerStep;
-    values(rate) = adjoint.lambda_rate_;
-    return kOk;
-  });
-}
-
-int Adjoint::mu_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self) {
-  Adjoint& adjoint = *static_cast<Adjoint*>(self);
-  return adjoint.run_.flow().thrown().keep([&] {
-    if (!adjoint.evaluate(t, y, lambda)) return kTryASmallerStep;
-    values(rate) = adjoint.mu_rate_;
+    values(out) = adjoint.*Rate;
     return kOk;
   });
 }
@@ -158,7 +150,7 @@ void Adjoint::create_backward() {
   const bool stiff = is_stiff_method(settings_);
   void* memory = run_.memory();
   run_.require(CVodeCreateB(memory, stiff ? CV_BDF : CV_ADAMS, &which_));
-  run_.require(CVodeInitB(memory, which_, lambda_rate, settings_.end_time, lambda_vector_));
+  run_.require(CVodeInitB(memory, which_, rate<&Adjoint::lambda_rate_>, settings_.end_time, lambda_vector_));
   run_.require(CVodeSetUserDataB(memory, which_, this));
   // atol is meant for a state of size one. lambda has the size of psi divided by that of the state.
   Vector atol(states_ * objectives_, run_.context()), atol_mu(active_ * objectives_, run_.context());
@@ -180,7 +172,7 @@ void Adjoint::create_backward() {
     run_.require(CVodeSetNonlinearSolverB(memory, which_, fixed_point_.get()));
   }
   if (active_ == 0) return;
-  run_.require(CVodeQuadInitB(memory, which_, mu_rate, mu_vector_));
+  run_.require(CVodeQuadInitB(memory, which_, rate<&Adjoint::mu_rate_>, mu_vector_));
   run_.require(CVodeQuadSVtolerancesB(memory, which_, s.rtol, atol_mu));
   run_.require(CVodeSetQuadErrConB(memory, which_, SUNTRUE));
 }
@@ -267,13 +259,12 @@ namespace mbsopt {
 
 SimulationResult cvodes_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
                                 std::span<const Cost> costs, const RunOptions& options) {
-  cvodes::refuse_what_cannot_be(settings, options);
-  cvodes::ForwardRun run(mechanism, settings, costs);
+  cvodes::ForwardRun run(mechanism, settings, costs, options);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   if (!result.ok()) return run.finish();
   if (costs.empty()) {
-    run.go({}, options, {});
+    run.go({}, {});
     return run.finish();
   }
   cvodes::Adjoint adjoint(run, settings, costs);
@@ -281,17 +272,12 @@ SimulationResult cvodes_adjoint(const Mechanism& mechanism, const SimulationSett
   hooks.advance = [&](double end, N_Vector y, double* t) { return adjoint.advance(end, y, t); };
   hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) { adjoint.take_sample(event, at); };
   hooks.accepted = [&](const StatePoint& at) { adjoint.take_step(at); };
-  run.go({}, options, hooks);
+  run.go({}, hooks);
   if (!result.ok()) return run.finish();
   result.statistics.adjoint_memory_bytes = adjoint.bytes();
   adjoint.go_back(options);
   result.statistics.factorisations += adjoint.factorisations();
-  if (!result.ok()) return run.finish();
-  Eigen::MatrixXd mu = adjoint.mu();
-  const Eigen::MatrixXd lambda = adjoint.lambda();
-  run.assembly().add_adjoint(lambda, mu);
-  result.psi_y_initial = lambda.transpose();
-  result.psi_rho = mu.transpose();
+  if (result.ok()) add_start_gradient(run.assembly(), adjoint.lambda(), adjoint.mu(), result);
   return run.finish();
 }
 

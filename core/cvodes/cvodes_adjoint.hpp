@@ -38,8 +38,8 @@ class Adjoint {
     Eigen::Index objective;
     Eigen::VectorXd y_bar;
   };
-  static int lambda_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self);
-  static int mu_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self);
+  template <Eigen::VectorXd Adjoint::*Rate>
+  static int rate(realtype t, N_Vector y, N_Vector lambda, N_Vector out, void* self);
   bool evaluate(double t, N_Vector y, N_Vector lambda);  // both rates
   void begin();                                          // terminal costs
   void take_jumps(double t);                             // of samples at or after t

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/cvodes/cvodes_thrown.hpp"
+#include "core/cvodes/cvodes_handles.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
 

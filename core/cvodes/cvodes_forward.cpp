@@ -113,15 +113,15 @@ void Sensitivities::take_sample(const SampleEvent& event, const StatePoint& at) 
   }
 }
 
-void Sensitivities::finish(double end) {
-  double t = end;
+const Eigen::MatrixXd& Sensitivities::finish() {
+  const StatePoint end = run_.end();
+  double t = end.t;
   run_.require(CVodeGetSens(run_.memory(), &t, s_));
   for (std::size_t k = 0; k < active_.size(); ++k) y_rho_.col(active_[k]) = s_.at(static_cast<int>(k));
-  const StatePoint at{end, run_.result().y_end, run_.flow().angles_at(end), run_.flow().motion()};
   for (std::size_t o = 0; o < costs_.size(); ++o) {
-    if (costs_[o].terminal) add_cost(*costs_[o].terminal, at, static_cast<Eigen::Index>(o));
+    if (costs_[o].terminal) add_cost(*costs_[o].terminal, end, static_cast<Eigen::Index>(o));
   }
-  if (run_.running().empty()) return;
+  if (run_.running().empty()) return psi_rho_;
   const VectorArray integrals(static_cast<int>(active_.size()), static_cast<Eigen::Index>(run_.running().size()),
                               run_.context());
   run_.require(CVodeGetQuadSens(run_.memory(), &t, integrals));
@@ -130,6 +130,7 @@ void Sensitivities::finish(double end) {
       psi_rho_(run_.running()[q], active_[k]) += integrals.at(static_cast<int>(k))(static_cast<Eigen::Index>(q));
     }
   }
+  return psi_rho_;
 }
 
 }  // namespace mbsopt::cvodes
@@ -139,8 +140,7 @@ namespace mbsopt {
 SimulationResult cvodes_forward(const Mechanism& mechanism, const SimulationSettings& settings,
                                 std::span<const Cost> costs, const TangentSampling& sampling,
                                 const RunOptions& options) {
-  cvodes::refuse_what_cannot_be(settings, options);
-  cvodes::ForwardRun run(mechanism, settings, costs);
+  cvodes::ForwardRun run(mechanism, settings, costs, options);
   const Eigen::Index objectives = static_cast<Eigen::Index>(costs.size());
   run.result().psi_rho.setZero(objectives, mechanism.parameters());
   if (!run.result().ok()) return run.finish();
@@ -151,17 +151,14 @@ SimulationResult cvodes_forward(const Mechanism& mechanism, const SimulationSett
     hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) {
       if (!event.cost && sampling.observe) cvodes::observe(run, sampling, event, at, rate, none);
     };
-    run.go(sampling.times, options, hooks);
+    run.go(sampling.times, hooks);
     return run.finish();
   }
   cvodes::Sensitivities sensitivities(run, settings, costs, sampling);
   cvodes::ForwardRun::Hooks hooks;
   hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) { sensitivities.take_sample(event, at); };
-  run.go(sampling.times, options, hooks);
-  if (run.result().ok()) {
-    sensitivities.finish(settings.end_time);
-    run.result().psi_rho = sensitivities.psi_rho();
-  }
+  run.go(sampling.times, hooks);
+  if (run.result().ok()) run.result().psi_rho = sensitivities.finish();
   return run.finish();
 }
 

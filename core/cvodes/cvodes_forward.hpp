@@ -20,9 +20,8 @@ class Sensitivities {
   Sensitivities& operator=(const Sensitivities&) = delete;
 
   void take_sample(const SampleEvent& event, const StatePoint& at);
-  // Adds integrals and terminal costs, after the last step.
-  void finish(double end);
-  const Eigen::MatrixXd& psi_rho() const { return psi_rho_; }
+  // Adds integrals and terminal costs, after the last step, and returns psi_rho.
+  const Eigen::MatrixXd& finish();
 
  private:
   static int f(int count, realtype t, N_Vector y, N_Vector ydot, N_Vector* s, N_Vector* sdot, void* run, N_Vector,

@@ -1,6 +1,7 @@
-// NewtonMatrix as a direct linear solver of SUNDIALS: CVODES decides when f_y is evaluated anew and when its factor is
-// kept. The forward run solves (I - gamma f_y) x = b. The right-hand side of the adjoint is -f_y'lambda per objective,
-// so it solves (I + gamma f_y')x = b for each objective's part of the vector.
+// The matrix of Newton's iteration in an implicit multistep method, I - gamma f_y, as a direct linear solver of
+// SUNDIALS: CVODES decides when f_y is evaluated anew and when its factor is kept. The forward run solves (I - gamma
+// f_y) x = b. The right-hand side of the adjoint is -f_y'lambda per objective, so it solves (I + gamma f_y')x = b for
+// each objective's part of the vector.
 #pragma once
 
 #include <sundials/sundials_linearsolver.h>
@@ -9,10 +10,33 @@
 #include <memory>
 #include <type_traits>
 
-#include "core/cvodes/cvodes_handles.hpp"
-#include "core/cvodes/cvodes_newton.hpp"
+#include "core/cvodes/cvodes_flow.hpp"
+#include "core/step/shifted_system.hpp"
 
 namespace mbsopt::cvodes {
+
+// I - gamma f_y and its transpose, at a state of the flow (shifted_system.hpp).
+class NewtonMatrix {
+ public:
+  explicit NewtonMatrix(Flow& flow);
+  NewtonMatrix(const NewtonMatrix&) = delete;  // its system refers to its Jacobian
+  NewtonMatrix& operator=(const NewtonMatrix&) = delete;
+
+  bool linearise(double t, const Flow::Numbers& y);                     // f_y at this state
+  bool factor(double gamma) { return system_.factor(gamma, values_); }  // false: it is not finite, or singular
+  // x is the right-hand side on entry and the solution on return. It is refined once, because CVODES takes it as exact.
+  void solve(Eigen::Ref<Eigen::VectorXd> x) { system_.solve(x, 1); }
+  void solve_transposed(Eigen::Ref<Eigen::VectorXd> x) { system_.solve_transposed(x, 1); }
+  long factorisations() const { return system_.factorisations(); }
+
+ private:
+  Flow& flow_;
+  StageEquations equations_;
+  MotionJacobian jacobian_;
+  MotionJacobian::Values values_;
+  ShiftedSystem system_;
+  Eigen::VectorXd y_;
+};
 
 class LinearSolver {
  public:

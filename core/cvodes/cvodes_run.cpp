@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "core/run/run_ends.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/start/model_warnings.hpp"
 #include "core/step/step_control.hpp"
@@ -31,30 +32,26 @@ constexpr long kMostIterations = std::numeric_limits<int>::max();
 
 bool is_stiff_method(const SimulationSettings& settings) { return settings.integrator.type == "cvodes_bdf"; }
 
-ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs)
-    : start_(std::chrono::steady_clock::now()),
-      mechanism_(mechanism),
-      settings_(settings),
+ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+                       const RunOptions& options)
+    : mechanism_(mechanism),
+      settings_(possible(settings, options)),
       costs_(costs),
+      options_(options),
       assembly_(mechanism, settings.start_time),
+      result_(result_at_start(assembly_, settings.start_time, costs.size())),
       tolerances_(mechanism.data(), settings.integrator),
       flow_(mechanism, settings.formulation),
       violations_(make_projector(mechanism, Projection::none)),
       y_(mechanism.states(), context_),
       y_sample_(mechanism.states(), context_),
       linear_solver_(flow_, context_) {
-  result_.psi.setZero(static_cast<Eigen::Index>(costs.size()));
-  result_.last_good_time = settings.start_time;
-  result_.y_initial = assembly_.result().y;
   y_now_ = assembly_.result().y;
   for (std::size_t o = 0; o < costs.size(); ++o) {
     if (costs[o].running) running_.push_back(static_cast<Eigen::Index>(o));
   }
   left_range_.assign(running_.size(), false);
-  if (!assembly_.result().ok) {
-    stop(SimulationStatus::assembly_failed, assembly_.result().message);
-    return;
-  }
+  if (!result_.ok()) return;
   flow_.start(settings.start_time, assembly_.result().angles);
   *y_ = assembly_.result().y;
   if (!flow_.evaluate(settings.start_time, *y_) || !massless_bodies(mechanism, assembly_).empty()) {
@@ -227,9 +224,9 @@ std::string ForwardRun::about_quadratures() const {
 }
 
 // The branch is the nearest one, so a joint must not turn by half a turn in one step.
-bool ForwardRun::step_is_followed(double h, const Eigen::VectorXd& y) {
+bool ForwardRun::step_is_followed(double h) {
   for (const JointAngle& a : mechanism_.data().angles) {
-    const double rate = std::abs(a.rate(body_at(y, a.body1).frame, body_at(y, a.body2).frame));
+    const double rate = std::abs(a.rate(body_at(y_now_, a.body1).frame, body_at(y_now_, a.body2).frame));
     if (rate * h <= 3) continue;
     stop(SimulationStatus::step_too_large,
          fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; more "
@@ -238,20 +235,6 @@ bool ForwardRun::step_is_followed(double h, const Eigen::VectorXd& y) {
     return false;
   }
   return true;
-}
-
-Energy ForwardRun::update_statistics(double t, const Eigen::VectorXd& y) {
-  SimulationStatistics& s = result_.statistics;
-  const Eigen::VectorXd& angles = flow_.angles_at(t);
-  double relative = 0;
-  s.max_position_violation =
-      std::max(s.max_position_violation, violations_->position_violation(t, angles, y, &relative));
-  s.relative_position_violation = std::max(s.relative_position_violation, relative);
-  s.max_velocity_violation = std::max(s.max_velocity_violation, violations_->velocity_violation(t, y));
-  const Energy e = energy(mechanism_.data(), y, angles);
-  s.energy_final = e.kinetic + e.potential;
-  s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));
-  return e;
 }
 
 void ForwardRun::take_samples(SampleSchedule& schedule, double t, const Hooks& hooks) {
@@ -283,26 +266,21 @@ void ForwardRun::count_steps() {
 
 // The latest end of the step at t. CVODES cannot take back a step that passes over a pulse, so it must end before.
 double ForwardRun::stop_before_pulse(double t, PulseWatch& pulses) {
-  constexpr double kMissed = 10;       // tolerances, as of other methods (runge_kutta_run.cpp)
-  constexpr double kShortest = 1e-10;  // of the run
-  const double left = settings_.end_time - t;
+  const double end = settings_.end_time, shortest = PulseWatch::kShortest * (end - settings_.start_time);
   double h = 0;
   CVodeGetCurrentStep(memory(), &h);  // that of the next step; 0 before the first one, which is short
-  h = std::min(h, left);
-  const auto is_missed = [&](const PulseWatch::Doubt& doubt) {
-    if (doubt.share > 0) return doubt.share > kMissed * settings_.integrator.rtol;
+  h = std::min(h, end - t);
+  const auto change = [&](double at, double beside, double duration) {
     const Flow::Numbers y(y_now_.data(), y_now_.size());
-    if (!flow_.evaluate(doubt.beside, y)) return false;
+    if (!flow_.evaluate(beside, y)) return 0.0;
     y_change_ = flow_.ydot();
-    if (!flow_.evaluate(doubt.at, y)) return false;
-    y_change_ = doubt.duration * (flow_.ydot() - y_change_);
-    return scaled_norm(y_change_, y_now_, y_now_, tolerances_) > kMissed;
+    if (!flow_.evaluate(at, y)) return 0.0;
+    y_change_ = duration * (flow_.ydot() - y_change_);
+    return scaled_norm(y_change_, y_now_, y_now_, tolerances_);
   };
   bool shorter = false;
-  while (h > kShortest * (settings_.end_time - settings_.start_time) &&
-         std::ranges::any_of(pulses.doubts(t, h), is_missed))
-    h /= 2, shorter = true;
-  return shorter ? t + h : settings_.end_time;
+  while (h > shortest && pulses.worst(t, h, true, change).error > PulseWatch::kMissed) h /= 2, shorter = true;
+  return shorter ? t + h : end;
 }
 
 // One internal step from t to t1. Returns false, with the reason in the result, if there is none.
@@ -324,87 +302,78 @@ bool ForwardRun::advance(double t, const Hooks& hooks, double& t1) {
   return result_.ok();
 }
 
-void ForwardRun::go(std::span<const double> observed, const RunOptions& options, const Hooks& hooks) {
+void ForwardRun::go(std::span<const double> observed, const Hooks& hooks) {
   if (!result_.ok()) return;
   const double end = settings_.end_time;
-  SampleSchedule schedule(costs_, observed, end);
-  const Energy e = energy(mechanism_.data(), y_now_, assembly_.result().angles);
-  result_.statistics.energy_initial = result_.statistics.energy_final = e.kinetic + e.potential;
   double t = settings_.start_time, t1 = t;
-  RunGuard guard(mechanism_.data());
-  const std::string at_start = guard.begin(t, y_now_, e, end, settings_.integrator.max_steps);
-  if (!at_start.empty()) return stop(SimulationStatus::not_credible, at_start);
-  const bool derivatives = hooks.advance || sensitivities_;
+  SampleSchedule schedule(costs_, observed, end);
+  RunGuard guard(mechanism_.data(), *violations_, end, settings_.integrator.max_steps);
+  ObserverOf lengths([&](const SeenStep& step) {
+    return through_zero_length(mechanism_.data(), step.from.t, step.from.y, step.to.t, step.to.y);
+  });
+  ObserverOf samples([&](const SeenStep& step) {
+    t = result_.last_good_time = step.to.t;
+    take_samples(schedule, t, hooks);
+    if (hooks.accepted) hooks.accepted(step.to);
+    return std::string();
+  });
   std::optional<JumpWatch> jumps;
-  if (derivatives) {
-    jumps.emplace(mechanism_, settings_, costs_, flow_.motion());
-    jumps->begin({t, y_now_, assembly_.result().angles, flow_.motion()});
-  }
+  std::vector<StepObserver*> observers{&guard};
+  if (hooks.advance || sensitivities_)
+    observers.insert(observers.end(), {&lengths, &jumps.emplace(mechanism_, settings_, costs_, flow_.motion())});
+  observers.push_back(&samples);
   // CVODES sees the rates at the ends of a step.
-  PulseWatch pulses(mechanism_, costs_, t, end, {{0, 0.5, 0.5}, {1, 0.5, -0.5}});
-  Eigen::VectorXd y_before;
-  while (t < end) {
+  PulseWatch pulses(mechanism_, costs_, t, end, settings_.integrator.rtol, {{0, 0.5, 0.5}, {1, 0.5, -0.5}});
+  std::string words = objection_to_start(observers, {t, y_now_, assembly_.result().angles});
+  if (!words.empty()) stop(SimulationStatus::not_credible, std::move(words));
+  while (t < end && result_.ok()) {
     require(CVodeSetStopTime(memory(), stop_before_pulse(t, pulses)));
     if (!advance(t, hooks, t1)) break;
-    y_before = y_now_;
+    y_before_ = y_now_;
     y_now_ = *y_;
-    if (!step_is_followed(t1 - t, y_now_)) break;
+    if (!step_is_followed(t1 - t)) break;
     ++result_.statistics.steps;
     result_.steps.times.push_back(t);
     result_.steps.sizes.push_back(t1 - t);
     flow_.accept(t1, y_now_);
-    const Energy energy_now = update_statistics(t1, y_now_);
-    std::string objection = guard.objection(t1, y_now_, energy_now, flow_.worst_residual());
-    if (objection.empty() && derivatives) objection = through_zero_length(mechanism_.data(), t, y_before, t1, y_now_);
-    if (!objection.empty()) {
-      stop(SimulationStatus::not_credible, objection);
-      break;
-    }
-    t = result_.last_good_time = t1;
-    take_samples(schedule, t, hooks);
-    const StatePoint here{t, y_now_, flow_.angles_at(t), flow_.motion()};
-    if (jumps) jumps->look_at(here);
-    if (hooks.accepted) hooks.accepted(here);
-    if (options.after_step) options.after_step(here);
-    if (options.progress && !options.progress(t)) {
-      stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", t));
-      break;
+    const StatePoint before{t, y_before_, flow_.angles_at(t)}, here{t1, y_now_, flow_.angles_at(t1), flow_.motion()};
+    words = objection_to({before, here, flow_.worst_residual()}, observers);
+    if (words.empty()) {
+      report_step(here, options_, result_);
+    } else {
+      stop(SimulationStatus::not_credible, std::move(words));
     }
   }
   count_steps();
-  result_.statistics.relative_energy_drift = guard.relative_energy_drift();
   result_.y_end = y_now_;
-  if (jumps) jumps->add_to(result_.statistics);
-  if (result_.ok()) finish_costs();
+  for (StepObserver* const observer : observers) observer->add_to(result_.statistics);
+  if (!result_.ok()) return;
+  add_integrals();
+  add_terminal_costs(costs_, this->end(), result_);
 }
 
-void ForwardRun::finish_costs() {
+void ForwardRun::add_integrals() {
+  if (running_.empty()) return;
   double t = settings_.end_time;
-  if (!running_.empty()) {
-    Vector integrals(static_cast<Eigen::Index>(running_.size()), context_);
-    require(CVodeGetQuad(memory(), &t, integrals));
-    for (std::size_t k = 0; k < running_.size(); ++k) {
-      result_.psi(running_[k]) +=
-          left_range_[k] ? std::numeric_limits<double>::infinity() : (*integrals)(static_cast<Eigen::Index>(k));
-    }
+  Vector integrals(static_cast<Eigen::Index>(running_.size()), context_);
+  require(CVodeGetQuad(memory(), &t, integrals));
+  for (std::size_t k = 0; k < running_.size(); ++k) {
+    result_.psi(running_[k]) +=
+        left_range_[k] ? std::numeric_limits<double>::infinity() : (*integrals)(static_cast<Eigen::Index>(k));
   }
-  const StatePoint at{settings_.end_time, y_now_, flow_.angles_at(settings_.end_time), flow_.motion()};
-  for (std::size_t o = 0; o < costs_.size(); ++o) {
-    if (costs_[o].terminal) result_.psi(static_cast<Eigen::Index>(o)) += costs_[o].terminal->value(at);
-  }
-  if (!result_.psi.allFinite()) {
-    stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi));
-  }
+}
+
+StatePoint ForwardRun::end() {
+  const double t = settings_.end_time;
+  return {t, y_now_, flow_.angles_at(t), flow_.motion()};
 }
 
 SimulationResult ForwardRun::finish() {
   SimulationStatistics& s = result_.statistics;
   s.rhs_evaluations += flow_.evaluations();
   s.factorisations += flow_.dynamics().solver().factorisations() + linear_solver_.factorisations();
-  const double worst = flow_.worst_residual(), t = result_.last_good_time;
-  s.weak_joints_error = error_of_weak_joints(mechanism_, settings_.formulation, worst, t, y_now_, flow_.angles_at(t));
-  s.max_acceleration_residual = std::max(worst, s.weak_joints_error);
-  s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  const double t = result_.last_good_time;
+  add_residuals(mechanism_, settings_.formulation, flow_.worst_residual(), {t, y_now_, flow_.angles_at(t)}, s);
   return std::move(result_);
 }
 

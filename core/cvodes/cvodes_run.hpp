@@ -3,7 +3,6 @@
 // attach to the run through Hooks.
 #pragma once
 
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <span>
@@ -24,8 +23,9 @@
 namespace mbsopt::cvodes {
 
 bool is_stiff_method(const SimulationSettings& settings);  // cvodes_bdf
-// Throws std::invalid_argument for a type that CVODES does not have, a fixed step, or frozen steps.
-void refuse_what_cannot_be(const SimulationSettings& settings, const RunOptions& options);
+// Returns the settings. Throws std::invalid_argument for a type that CVODES does not have, a fixed step, or frozen
+// steps.
+const SimulationSettings& possible(const SimulationSettings& settings, const RunOptions& options);
 // The return values of right-hand sides that CVODES calls.
 inline constexpr int kOk = 0, kTryASmallerStep = 1;
 
@@ -43,7 +43,8 @@ class ForwardRun {
     std::function<void(const StatePoint& at)> accepted;                           // after each step
   };
 
-  ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs);
+  ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+             const RunOptions& options);
   ForwardRun(const ForwardRun&) = delete;
   ForwardRun& operator=(const ForwardRun&) = delete;
 
@@ -56,13 +57,14 @@ class ForwardRun {
   Eigen::VectorXd quadrature_atol() const;                               // of each of these
 
   // From assembly to the end, with values of all costs; result() says how it ended.
-  void go(std::span<const double> observed, const RunOptions& options, const Hooks& hooks);
+  void go(std::span<const double> observed, const Hooks& hooks);
   void set_sensitivities(Sensitivities* sensitivities) { sensitivities_ = sensitivities; }
   Sensitivities* sensitivities() const { return sensitivities_; }
   // The value of a running cost, or of its derivative. A value beyond the range of a quadrature makes psi not finite,
   // as an infinite sum would. From then on 0 is integrated, since so large a derivative may change its sign within
   // rounding.
   double bounded(double g, std::size_t quadrature);
+  StatePoint end();  // of the run
 
   void require(int flag) const;  // throws std::runtime_error where CVODES refused what is always right
   void stop(SimulationStatus status, std::string message);
@@ -73,31 +75,30 @@ class ForwardRun {
 
  private:
   void set_up();
-  bool step_is_followed(double h, const Eigen::VectorXd& y);
-  Energy update_statistics(double t, const Eigen::VectorXd& y);
+  bool step_is_followed(double h);
   double stop_before_pulse(double t, PulseWatch& pulses);
   bool advance(double t, const Hooks& hooks, double& t1);
   void take_samples(SampleSchedule& schedule, double t, const Hooks& hooks);
-  void finish_costs();
+  void add_integrals();
   void count_steps();  // rejected ones, and the work of their solutions
   static int f(realtype t, N_Vector y, N_Vector ydot, void* self);
   static int g(realtype t, N_Vector y, N_Vector gdot, void* self);
   static int weights(N_Vector y, N_Vector w, void* self);  // of the norm of errors
 
-  std::chrono::steady_clock::time_point start_;
   const Mechanism mechanism_;
   const SimulationSettings settings_;
   std::span<const Cost> costs_;
+  const RunOptions& options_;
   Assembly assembly_;
+  SimulationResult result_;
   ComponentTolerances tolerances_;
   Flow flow_;
   std::unique_ptr<Projector> violations_;
-  SimulationResult result_;
   std::vector<Eigen::Index> running_;
   std::vector<bool> left_range_;
   std::string last_words_;  // of CVODES
   Sensitivities* sensitivities_ = nullptr;
-  Eigen::VectorXd y_now_, y_change_;
+  Eigen::VectorXd y_before_, y_now_, y_change_;  // at the ends of the last step
 
   Context context_;
   Vector y_, y_sample_;

@@ -24,7 +24,7 @@ SimulationSettings with_cvodes(SimulationSettings settings) {
 
 namespace cvodes {
 
-void refuse_what_cannot_be(const SimulationSettings& settings, const RunOptions& options) {
+const SimulationSettings& possible(const SimulationSettings& settings, const RunOptions& options) {
   const std::string& type = settings.integrator.type;
   if (!is_cvodes(type)) throw std::invalid_argument(fmt::format("integrator '{}' is not one of CVODES'", type));
   if (settings.integrator.step) {
@@ -38,21 +38,21 @@ void refuse_what_cannot_be(const SimulationSettings& settings, const RunOptions&
     throw std::invalid_argument(
         fmt::format("integrator '{}' cannot repeat the steps of another run: its steps and orders are its own", type));
   }
+  return settings;
 }
 
 }  // namespace cvodes
 
 SimulationResult cvodes_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
                                  std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options) {
-  cvodes::refuse_what_cannot_be(settings, options);
-  cvodes::ForwardRun run(mechanism, settings, costs);
+  cvodes::ForwardRun run(mechanism, settings, costs, options);
   cvodes::ForwardRun::Hooks hooks;
   if (sampling.observe) {
     hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) {
       if (!event.cost) sampling.observe(event.index, at);
     };
   }
-  run.go(sampling.times, options, hooks);
+  run.go(sampling.times, hooks);
   return run.finish();
 }
 

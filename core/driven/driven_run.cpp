@@ -147,7 +147,7 @@ void DrivenRun::go_through_panels(const Take& take) {
     if (const std::string jump = options_.frozen ? std::string() : law_jumps_.between(t, resume); !jump.empty()) {
       return stop(SimulationStatus::not_credible, jump);
     }
-    if (course.jumps) course.jumps->look_at(point());
+    if (course.jumps) course.jumps->look_at({point_of(from_), point()});
     if (options_.after_step) options_.after_step(point());
     if (options_.progress && !options_.progress(t1)) {
       return stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", t1));

@@ -2,51 +2,32 @@
 
 #include <algorithm>
 
-#include "core/integrate/model_choice.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
 
 AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
-                           std::span<const Cost> costs, GradientQuadrature* watch)
-    : mechanism_(mechanism),
-      rk_(method),
-      costs_(costs),
-      dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
+                           std::span<const Cost> costs, bool watched, const StatePoint& end)
+    : Sweep(mechanism, settings, method, costs, watched),
       step_(make_step(mechanism, method, projector_->solution())),
-      bars_(costs.size()),
-      watch_(watch) {
+      bars_(costs.size()) {
   const MechanismData& d = mechanism.data();
-  if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
-  const Eigen::Index states = mechanism.states();
+  const Eigen::Index states = mechanism.states(), objectives = static_cast<Eigen::Index>(costs.size());
   for (Bars& b : bars_) {
     for (Eigen::VectorXd* x : {&b.lambda, &b.lambda_hat, &b.samples}) x->setZero(states);
     b.theta.setZero(d.slots());
     b.rho.setZero(d.rho.size());
     for (Eigen::MatrixXd* x : {&b.K, &b.Y}) x->setZero(states, rk_.dense_stages);
+    if (rk_.gamma) b.start.setZero(states), b.common.setZero(states);
   }
-  if (const int coupled = largest_implicit_group(rk_); coupled > 0) {
-    equations_.emplace(dynamics_.in_space());
-    implicit_.emplace(d, rk_);
-    x_bar_.setZero(coupled * StageEquations::count(d), static_cast<Eigen::Index>(costs.size()));
-  }
-  if (rk_.gamma) {
-    rosenbrock_.emplace(mechanism, rk_, dynamics_);
-    for (Bars& b : bars_) b.start.setZero(states), b.common.setZero(states);
-    x_bar_.setZero(states, static_cast<Eigen::Index>(costs.size()));
-  }
-  for (Eigen::VectorXd* x : {&y_, &ydot_, &w_, &y_bar_, &g_y_}) x->setZero(states);
-  g_rho_.setZero(d.rho.size());
+  if (const int coupled = largest_implicit_group(rk_); coupled > 0)
+    x_bar_.setZero(coupled * StageEquations::count(d), objectives);
+  if (rk_.gamma) x_bar_.setZero(states, objectives);
+  for (Eigen::VectorXd* x : {&w_, &y_bar_}) x->setZero(states);
   r_bar_.setZero(StageEquations::count(d));
   explicit_swept_.reserve(static_cast<std::size_t>(rk_.dense_stages));
-}
-
-void AdjointSweep::begin(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
-  for (std::size_t o = 0; o < costs_.size(); ++o) {
-    Bars& b = bars_[o];
-    b.lambda.setZero(), b.theta.setZero(), b.rho.setZero();
-    if (costs_[o].terminal) costs_[o].terminal->add_gradient({t, y, angles, motion()}, 1, b.lambda, b.rho);
-  }
+  for (std::size_t o = 0; o < costs_.size(); ++o)
+    if (costs_[o].terminal) costs_[o].terminal->add_gradient(end, 1, bars_[o].lambda, bars_[o].rho);
 }
 
 void AdjointSweep::rebuild(const StoredStep& step) {
@@ -99,18 +80,18 @@ bool AdjointSweep::step_back(const StoredStep& step) {
     }
     b.lambda = b.lambda_hat + b.samples;
   }
+  if (!(rosenbrock_ ? rosenbrock_back() : stages_back())) return false;
+  end_step(step_);
+  return true;
+}
 
-  if (rosenbrock_) {
-    if (watch_) watch_->end_step(step_);
-    return rosenbrock_back();
-  }
+bool AdjointSweep::stages_back() {
   explicit_swept_.clear();
   const std::span<const StageGroup> groups = rk_.stage_groups();
   for (auto g = groups.rbegin(); g != groups.rend(); ++g) {
     if (g->first >= step_.stages(rk_) || !is_used(rk_, *g, step_.dense)) continue;
     if (!(is_implicit(rk_, *g) ? implicit_back(*g) : explicit_back(g->first))) return false;
   }
-  if (watch_) watch_->end_step(step_);
   for (Bars& b : bars_) {
     StageSum sum;
     for (const int i : explicit_swept_) sum.add(1, b.Y.col(i).data());
@@ -187,24 +168,15 @@ bool AdjointSweep::rosenbrock_back() {
   return true;
 }
 
+// The gradient of the running cost at a node, whose state is y_, into y_bar_ and the objective's rho.
 void AdjointSweep::add_running_cost(std::size_t objective, int node) {
-  const PointCost* const running = costs_[objective].running.get();
-  if (!running || node >= rk_.nodes || rk_.node_b[node] == 0) return;
-  const double weight = step_.h * rk_.node_b[node];
-  g_y_.setZero(), g_rho_.setZero();
-  running->add_gradient({step_.t + rk_.node_c[node] * step_.h, y_, step_.angles0, motion()}, weight, g_y_, g_rho_);
-  if (watch_) {
-    node_rate(rk_, step_, node, ydot_);
-    watch_->take(objective, node, weight, g_y_, ydot_, g_rho_);
-  }
-  y_bar_ += g_y_, bars_[objective].rho += g_rho_;
+  if (!set_running_gradient(step_, objective, node)) return;
+  y_bar_ += g_y_;
+  bars_[objective].rho += g_rho_;
 }
 
 bool AdjointSweep::explicit_back(int i) {
-  const double t = step_.t + rk_.c[i] * step_.h;
-  y_ = step_.Y.col(i);
-  const Eigen::Index half = mechanism_.states() / 2;
-  if (!dynamics_.linearise(t, y_, step_.angles0, step_.K.col(i).tail(half), step_.lambda.col(i))) return false;
+  if (!linearise_stage(step_, i)) return false;
   for (std::size_t o = 0; o < bars_.size(); ++o) {
     Bars& b = bars_[o];
     StageSum w;  // kbar_i
@@ -225,15 +197,8 @@ bool AdjointSweep::explicit_back(int i) {
 // Qbar, Ybar: of running costs, whose value is taken at the stage itself.
 bool AdjointSweep::implicit_back(const StageGroup& g) {
   const Eigen::Index n = mechanism_.states() / 2, rows = StageEquations::count(mechanism_.data());
-  auto time_of = [&](int i) { return step_.t + rk_.c[i] * step_.h; };
-  auto place = [&](int i) {
-    y_ = step_.Y.col(i);
-    equations_->place_at(time_of(i), y_, step_.angles0, step_.K.col(i).tail(n), step_.lambda.col(i));
-  };
-  for (int i = g.first; i <= g.last; ++i) {
-    place(i);
-    implicit_->linearise(*equations_, i - g.first);
-  }
+  StageEquations* equations = nullptr;
+  for (int i = g.first; i <= g.last; ++i) equations = &implicit_->linearise(step_, i, i - g.first);
   if (!implicit_->factor(step_.h, g)) return false;
 
   for (std::size_t o = 0; o < bars_.size(); ++o) {
@@ -261,12 +226,12 @@ bool AdjointSweep::implicit_back(const StageGroup& g) {
   implicit_->solve_transposed(g, x_bar_);
 
   for (int i = g.last; i >= g.first; --i) {
-    if (i != g.last) place(i);  // where the last still is
+    if (i != g.last) implicit_->place_at(step_, i);  // where the last still is
     for (std::size_t o = 0; o < bars_.size(); ++o) {
       Bars& b = bars_[o];
       r_bar_ = x_bar_.col(static_cast<Eigen::Index>(o)).segment((i - g.first) * rows, rows);
       y_bar_.setZero();
-      equations_->add_adjoint(r_bar_, y_bar_, b.theta, b.rho);
+      equations->add_adjoint(r_bar_, y_bar_, b.theta, b.rho);
       b.Y.col(i) += y_bar_;
       for (int j = g.first; j <= g.last; ++j) b.Y.col(j).tail(n) += (step_.h * rk_.a(i, j)) * y_bar_.head(n);
     }

@@ -167,42 +167,54 @@ bool Checkpoints::reverse_blocks(const Snapshot& from, long last, long block, lo
 
 bool Checkpoints::advance(const Snapshot& from, Snapshot& to) {
   long index = from.step;
-  return run_again(
-      from, to.step, [] { return false; },
-      [&](const Step& step) {
-        if (++index != to.step) return;
-        to.y0 = step.y1;
-        to.angles = step.angles1;
-      });
+  ObserverOf sink([&](const SeenStep& step) {
+    if (++index == to.step) {
+      to.y0 = step.to.y;
+      to.angles = step.to.angles;
+    }
+    return std::string();
+  });
+  return run_again(from, to.step, sink);
 }
 
-bool Checkpoints::run_again(const Snapshot& from, long last, const std::function<bool()>& dense,
-                            const std::function<void(const Step&)>& sink) {
+bool Checkpoints::run_again(const Snapshot& from, long last, StepObserver& sink) {
   recomputed_ += last - from.step;
-  return replay_(from, last, dense, sink);
+  return replay_(from, last, sink);
 }
+
+// Keeps the steps that it sees from `first` on.
+class Checkpoints::Keeper final : public StepObserver {
+ public:
+  Keeper(Checkpoints& checkpoints, long index, long first) : all_(checkpoints), index_(index), first_(first) {}
+
+  bool reads_inside(double) const override { return index_ >= first_ && !samples().empty(); }
+  std::string look_at(const SeenStep& step) override {
+    if (index_ >= first_) {
+      events_.clear();
+      for (const auto& [of, event] : samples()) events_.push_back(event);
+      all_.kept_.emplace_back(*step.stages, all_.rk_, events_);
+      all_.count(mbsopt::bytes_of(all_.kept_.back()));
+    }
+    ++index_;
+    return {};
+  }
+
+ private:
+  std::span<const std::pair<long, SampleEvent>> samples() const {  // of the present step
+    const auto [begin, end] =
+        std::equal_range(all_.events_.begin(), all_.events_.end(), std::pair(index_, SampleEvent{}),
+                         [](const auto& a, const auto& b) { return a.first < b.first; });
+    return std::span(begin, end);
+  }
+  Checkpoints& all_;
+  long index_, first_;
+  std::vector<SampleEvent> events_;
+};
 
 // Computes from..last again, keeps the steps from `first` on, and goes back over these.
 bool Checkpoints::keep_and_go_back(const Snapshot& from, long first, long last) {
-  long index = from.step;
-  const auto events_in = [&](long step) {
-    const auto [begin, end] = std::equal_range(events_.begin(), events_.end(), std::pair(step, SampleEvent{}),
-                                               [](const auto& a, const auto& b) { return a.first < b.first; });
-    return std::span(begin, end);
-  };
-  std::vector<SampleEvent> events;
-  const bool ok = run_again(
-      from, last, [&] { return index >= first && !events_in(index).empty(); },
-      [&](const Step& step) {
-        if (index >= first) {
-          events.clear();
-          for (const auto& [of, event] : events_in(index)) events.push_back(event);
-          kept_.emplace_back(step, rk_, events);
-          count(mbsopt::bytes_of(kept_.back()));
-        }
-        ++index;
-      });
-  return ok && back_over_kept();
+  Keeper keeper(*this, from.step, first);
+  return run_again(from, last, keeper) && back_over_kept();
 }
 
 }  // namespace mbsopt

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "core/step/stored_step.hpp"
+#include "core/watch/step_observer.hpp"
 
 namespace mbsopt {
 
@@ -36,10 +37,9 @@ class Checkpoints {
   // Forward: each accepted step in turn, with the samples in it.
   void keep(const Step& step, std::span<const SampleEvent> events);
 
-  // Computes the steps from a snapshot to `last` (not included) again, and gives each to a sink. dense(): whether the
-  // present step needs dense output. Returns whether it succeeds.
-  using Replay = std::function<bool(const Snapshot& from, long last, const std::function<bool()>& dense,
-                                    const std::function<void(const Step&)>& sink)>;
+  // Computes the steps from a snapshot to `last` (not included) again, and shows each to an observer. Returns whether
+  // it succeeds.
+  using Replay = std::function<bool(const Snapshot& from, long last, StepObserver& sink)>;
   using StepBack = std::function<bool(const StoredStep&)>;
   // Backward: every step, the last one first. False as soon as either function says so.
   bool go_back(const Replay& replay, const StepBack& back);
@@ -58,10 +58,10 @@ class Checkpoints {
   void turn_steps_into_snapshots();
   bool reverse(const Snapshot& from, long last);
   bool reverse_blocks(const Snapshot& from, long last, long block, long snapshots);
+  class Keeper;
   bool keep_and_go_back(const Snapshot& from, long first, long last);
   bool advance(const Snapshot& from, Snapshot& to);
-  bool run_again(const Snapshot& from, long last, const std::function<bool()>& dense,
-                 const std::function<void(const Step&)>& sink);
+  bool run_again(const Snapshot& from, long last, StepObserver& sink);
   bool back_over_kept();
 
   const Method& rk_;

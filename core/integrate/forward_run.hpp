@@ -7,7 +7,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "core/dynamics/motion_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -16,17 +15,15 @@
 #include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
 #include "core/start/assembly.hpp"
-#include "core/step/step.hpp"
+#include "core/watch/quadrature_watch.hpp"
+#include "core/watch/step_observer.hpp"
 
 namespace mbsopt {
 
-class QuadratureWatch;
-
-class ForwardRun {
+class ForwardRun : private StepObserver {
  public:
   // False where a factorisation failed.
   using Follow = std::function<bool(const Step&, std::span<const SampleEvent>)>;
-
   using Observe = std::function<void(std::size_t, const StatePoint&)>;
 
   // Throws std::invalid_argument where settings name no Runge-Kutta method, or one that lacks a step.
@@ -34,18 +31,23 @@ class ForwardRun {
              Assembly assembly);
 
   // observed: times [s] at which `observe` sees the state. `follow` may be empty.
-  void go(std::span<const double> observed, const Observe& observe, const RunOptions& options, const Follow& follow);
+  void go(std::span<const double> observed, Observe observe, const RunOptions& options, const Follow& follow);
 
   const Method& method() const { return method_; }
   const Assembly& assembly() const { return assembly_; }
   SimulationResult& result() { return result_; }
-  const Eigen::VectorXd& angles_end() const { return angles_end_; }
+  StatePoint end() { return {settings_.end_time, result_.y_end, angles_end_, motion()}; }
+  // The largest |ydot|/|y| at the start of a followed step, times the span of the run.
+  double shift_in_time() const { return shift_in_time_; }
   SimulationResult finish() { return std::move(result_); }
 
  private:
-  std::string add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch);
-  void sample(const Step& step, std::span<const SampleEvent> events, const Observe& observe, Eigen::VectorXd& y);
-  void add_terminal_costs();
+  // The values of costs and samples of a step.
+  bool reads_inside(double t1) const override { return schedule_->due(t1); }
+  std::string look_at(const SeenStep& step) override;
+  void add_to(SimulationStatistics& statistics) override { quadrature_.add_to(statistics); }
+  void add_running_costs(const Step& step);
+  void sample(const Step& step);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 
   const Mechanism mechanism_;
@@ -55,8 +57,13 @@ class ForwardRun {
   Assembly assembly_;
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   SimulationResult result_;
-  Eigen::VectorXd angles_end_;
-  std::vector<double> g_;  // of the running costs at their nodes of a step
+  QuadratureWatch quadrature_;
+  bool judges_ = true;  // given steps have been judged where they were found
+  std::optional<SampleSchedule> schedule_;
+  std::span<const SampleEvent> samples_;  // in the present step
+  Observe observe_;
+  double shift_in_time_ = 0;
+  Eigen::VectorXd y_, angles_end_;
 };
 
 }  // namespace mbsopt

@@ -13,23 +13,22 @@
 
 namespace mbsopt {
 
-StepAttempt::StepAttempt(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
-                         const ComponentTolerances& tolerances)
-    : dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
-      step_(make_step(mechanism, method, projector_->solution())),
-      data_(mechanism.data()),
+StepAttempt::StepAttempt(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
+    : mechanism_(mechanism),
+      settings_(settings),
       rk_(method),
-      tolerances_(tolerances) {
+      tolerances_(mechanism.data(), settings.integrator),
+      dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
+      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
+      step_(make_step(mechanism, method, projector_->solution())) {
+  const MechanismData& d = mechanism.data();
   const Eigen::Index states = mechanism.states();
   for (Eigen::VectorXd* x : {&work_, &ydot_, &y_stage_}) x->setZero(states);
-  const bool constrained = settings.formulation.type == FormulationType::augmented_lagrangian && closes_loops(data_);
+  const bool constrained = settings.formulation.type == FormulationType::augmented_lagrangian && closes_loops(d);
   if (constrained && !rk_.implicit() && projector_->positions()) {
-    const bool planar = model_of(mechanism, settings, method) == Model::planar;
-    response_.setZero(planar ? static_cast<Eigen::Index>(data_.planar->rows.size()) : data_.m);
-    passage_.emplace(rk_, response_.size());
-    no_parameters_ = block_without_parameters(data_);
-    for (LaneRows* x : {&error_, &projected_error_}) x->setZero(states, kLanes);
+    response_.setZero(is_planar() ? static_cast<Eigen::Index>(d.planar->rows.size()) : d.m);
+    no_parameters_ = block_without_parameters(d);
+    for (LaneRows* x : {&error_lanes_, &projected_lanes_}) x->setZero(states, kLanes);
   }
   if (rk_.gamma) {
     rosenbrock_.emplace(mechanism, rk_, dynamics_);
@@ -38,20 +37,21 @@ StepAttempt::StepAttempt(const Mechanism& mechanism, const SimulationSettings& s
   }
 }
 
-void StepAttempt::start_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
-  step_.t = t, step_.y0 = y, step_.angles0 = angles;
-}
-
-bool StepAttempt::begin() {
+bool StepAttempt::begin(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  step_.t = t;
+  step_.y0 = y;
+  step_.angles0 = angles;
   evaluations_ = 0;
+  worst_of_rejected_ = 0;
   first_stage_known_ = false;
-  if (!dynamics_.evaluate(step_.t, step_.y0, step_.angles0, ydot_)) return false;
+  if (!dynamics_.evaluate(t, step_.y0, step_.angles0, ydot_)) return false;
   if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
+  accepted_residual_ = dynamics_.worst_residual();
   return true;
 }
 
-double StepAttempt::first_step(const IntegratorSettings& s, double span) {
-  if (s.initial_step) return std::min(*s.initial_step, span);
+double StepAttempt::first_size(double span) {
+  if (settings_.integrator.initial_step) return std::min(*settings_.integrator.initial_step, span);
   const Eigen::VectorXd& y0 = step_.y0;
   if (!dynamics_.evaluate(step_.t, y0, step_.angles0, ydot_)) return 1e-6 * span;
   ++evaluations_;
@@ -69,9 +69,8 @@ double StepAttempt::first_step(const IntegratorSettings& s, double span) {
 }
 
 bool StepAttempt::evaluate_stage(int i) {
-  StageSum sum;
-  for (int j = 0; j < i; ++j) sum.add(step_.h * rk_.a(i, j), step_.K.col(j).data());
-  sum.to(step_.y0.data(), y_stage_.data(), y_stage_.size());
+  sum_stages(
+      step_.K, i, [&](int j) { return step_.h * rk_.a(i, j); }, step_.y0, y_stage_);
   step_.Y.col(i) = y_stage_;
   ++evaluations_;
   if (!dynamics_.evaluate(step_.t + rk_.c[i] * step_.h, y_stage_, step_.angles0, step_.K.col(i))) return false;
@@ -97,17 +96,24 @@ bool StepAttempt::solve_stages(ImplicitStages::Goal goal) {
   return true;
 }
 
-double StepAttempt::error_of_step() {
-  auto norm = [&](const double* weights) {
+double StepAttempt::norm_of_work() const { return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_); }
+
+// norm(): of the estimate in work_.
+template <class Norm>
+double StepAttempt::error_by(Norm&& norm) {
+  const auto estimate = [&](const double* weights) {
     work_.setZero();
-    StageSum sum;
-    for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * weights[i], step_.K.col(i).data());
-    sum.to(work_.data(), work_.data(), work_.size());
-    if (rk_.error_filter != 0 && !implicit_->filter(step_, work_)) return double(INFINITY);
-    return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_);
+    add_stages(
+        step_.K, rk_.stages, [&](int i) { return step_.h * weights[i]; }, work_);
+    return norm();
   };
-  const double high = norm(rk_.error);
-  return rk_.error_low ? combined_error(high, norm(rk_.error_low)) : high;
+  const double high = estimate(rk_.error);
+  return rk_.error_low ? combined_error(high, estimate(rk_.error_low)) : high;
+}
+
+double StepAttempt::error_of_step() {
+  return error_by(
+      [&] { return rk_.error_filter != 0 && !implicit_->filter(step_, work_) ? double(INFINITY) : norm_of_work(); });
 }
 
 // The error after projection. Next to a singular position most of the error is magnified rounding. The constraints hold
@@ -116,53 +122,36 @@ double StepAttempt::error_after_projection() {
   const double t1 = step_.t + step_.h;
   if (!projector_->project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
   if (!projector_->linearise(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
-  const double* weights[2] = {rk_.error, rk_.error_low};
-  for (int k = 0; k < 2; ++k) {
-    if (!weights[k]) continue;
-    work_.setZero();
-    StageSum sum;
-    for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * weights[k][i], step_.K.col(i).data());
-    sum.to(work_.data(), work_.data(), work_.size());
-    error_.col(k) = work_;
-  }
-  projector_->tangent(no_parameters_, error_, projected_error_);
-  auto norm = [&](int k) {
-    work_ = projected_error_.col(k);
-    return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_);
-  };
-  return rk_.error_low ? combined_error(norm(0), norm(1)) : norm(0);
+  return error_by([&] {
+    error_lanes_.col(0) = work_;
+    projector_->tangent(no_parameters_, error_lanes_, projected_lanes_);
+    work_ = projected_lanes_.col(0);
+    return norm_of_work();
+  });
 }
 
-bool StepAttempt::better_placed_by(double wanted, double largest) {
-  projector_->response(response_);
-  if (passage_->well_placed(step_.t, step_.h, wanted, largest, response_)) return false;
-  return std::abs(passage_->propose(step_.t, wanted, largest) - step_.h) > 0.02 * step_.h;
-}
-
-StepOutcome StepAttempt::solve(double h, bool adaptive, bool exact, double& error) {
+StepAttempt::Solved StepAttempt::solve(double h, StepGoal goal, bool near_singular) {
   using Goal = ImplicitStages::Goal;
+  const Goal of_stages = goal == StepGoal::fixed ? Goal::rounding : Goal::tolerance;
   step_.h = h;
-  const Goal goal = adaptive ? Goal::tolerance : Goal::rounding;
-  bool solved = solve_stages(goal);
+  bool solved = solve_stages(of_stages);
   if (!solved && implicit_ && implicit_->stale()) {
     implicit_->renew();
-    solved = solve_stages(goal);
+    solved = solve_stages(of_stages);
   }
-  if (!solved) return implicit_ ? StepOutcome::unsolved : StepOutcome::failed;
+  if (!solved) return {implicit_ ? StepOutcome::unsolved : StepOutcome::failed};
   set_y_hat();
-  error = 0;
-  if (!adaptive) return step_.y_hat.allFinite() ? StepOutcome::accepted : StepOutcome::failed;
-  error = error_of_step();
-  if (!std::isfinite(error)) return StepOutcome::failed;
-  projected_out_ = 0;
-  if (error > 1 && passage_ && passage_->near(step_.t, h))
-    projected_out_ = std::exchange(error, std::min(error, error_after_projection()));
-  if (error > 1) return StepOutcome::rejected;
-  if (implicit_ && exact) {
-    if (!solve_stages(Goal::polish)) return StepOutcome::unsolved;
+  if (goal == StepGoal::fixed) return {step_.y_hat.allFinite() ? StepOutcome::accepted : StepOutcome::failed};
+  double error = error_of_step();
+  if (!std::isfinite(error)) return {StepOutcome::failed, error};
+  projected_error_ = 0;
+  if (error > 1 && near_singular) projected_error_ = std::exchange(error, std::min(error, error_after_projection()));
+  if (error > 1) return {StepOutcome::rejected, error};
+  if (implicit_ && goal == StepGoal::derivatives) {
+    if (!solve_stages(Goal::polish)) return {StepOutcome::unsolved, error};
     set_y_hat();
   }
-  return StepOutcome::accepted;
+  return {StepOutcome::accepted, error};
 }
 
 double StepAttempt::change_by(double at, double beside, double duration) {
@@ -171,13 +160,12 @@ double StepAttempt::change_by(double at, double beside, double duration) {
   if (!dynamics_.evaluate(beside, y_stage_, step_.angles0, work_)) return 0;
   if (!dynamics_.evaluate(at, y_stage_, step_.angles0, ydot_)) return 0;
   work_ = duration * (ydot_ - work_);
-  return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_);
+  return norm_of_work();
 }
 
 void StepAttempt::set_y_hat() {
-  StageSum sum;
-  for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * rk_.b[i], step_.K.col(i).data());
-  sum.to(step_.y0.data(), step_.y_hat.data(), step_.y_hat.size());
+  sum_stages(
+      step_.K, rk_.stages, [&](int i) { return step_.h * rk_.b[i]; }, step_.y0, step_.y_hat);
 }
 
 StepOutcome StepAttempt::finish(double t1, bool dense) {
@@ -188,23 +176,29 @@ StepOutcome StepAttempt::finish(double t1, bool dense) {
       if (!evaluate_stage(i)) return StepOutcome::failed;
     }
   }
-  if (projector_->active()) {
-    if (!projector_->project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) {
-      return StepOutcome::off_constraints;
-    }
-  } else {
+  if (!projector_->active()) {
     step_.y1 = step_.y_hat;
+  } else if (!projector_->project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) {
+    return StepOutcome::off_constraints;
   }
   step_.angles1 = step_.angles0;
-  continue_angles(data_, step_.y1, step_.angles1);
+  continue_angles(mechanism_.data(), step_.y1, step_.angles1);
   return StepOutcome::accepted;
 }
 
-void StepAttempt::accept() {
-  if (implicit_) implicit_->accept(step_);
+const Eigen::VectorXd& StepAttempt::response() {
+  projector_->response(response_);
+  return response_;
+}
+
+void StepAttempt::reject() {
+  worst_of_rejected_ = std::max(worst_of_rejected_, dynamics_.worst_residual());
+  dynamics_.set_worst_residual(accepted_residual_);
 }
 
 void StepAttempt::advance(double t) {
+  accepted_residual_ = dynamics_.worst_residual();
+  if (implicit_) implicit_->accept(step_);
   step_.t = t;
   step_.y0 = step_.y1;
   step_.angles0 = step_.angles1;
@@ -217,23 +211,11 @@ void StepAttempt::restart() {
   implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
 }
 
-void StepAttempt::add_counts(SimulationStatistics& s) const {
+void StepAttempt::add_to(SimulationStatistics& s) const {
   s.rhs_evaluations += evaluations_;
   s.linear_solves += evaluations_;
-  if (implicit_) {
-    s.rhs_evaluations += implicit_->evaluations();
-    s.newton_iterations += implicit_->iterations();
-    s.linear_solves += implicit_->solves();
-    s.linearised_states += implicit_->places();
-    s.jacobians += implicit_->jacobians();
-    s.factorisations += implicit_->factorisations();
-  }
-  if (rosenbrock_) {
-    s.rhs_evaluations += rosenbrock_->evaluations();
-    s.linear_solves += rosenbrock_->evaluations() + rosenbrock_->solves();
-    s.jacobians += rosenbrock_->jacobians();
-    s.factorisations += rosenbrock_->factorisations();
-  }
+  if (implicit_) implicit_->add_to(s);
+  if (rosenbrock_) rosenbrock_->add_to(s);
   s.factor_blocks = dynamics_.factor_blocks();
   s.factorisations += dynamics_.factorisations() + projector_->factorisations();
 }

@@ -3,26 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/integrate/model_choice.hpp"
 #include "core/linear/block_kernels.hpp"
 
 namespace mbsopt {
+
 TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
-                           const Eigen::MatrixXd& y_initial_rho, GradientQuadrature* watch)
-    : mechanism_(mechanism),
-      rk_(method),
-      dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
-      watch_(watch) {
+                           std::span<const Cost> costs, const TangentSampling& sampling,
+                           const Eigen::MatrixXd& y_initial_rho, bool watched, Eigen::MatrixXd& psi_rho)
+    : Sweep(mechanism, settings, method, costs, watched), sampling_(sampling), psi_rho_(psi_rho) {
   const MechanismData& d = mechanism.data();
-  if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states();
   for (int i = 0; i < rk_.dense_stages; ++i) of_stage_.push_back(integrated(rk_.A + i * rk_.dense_stages));
   std::array<double, Method::kMaxStages> b_of_all{};
   std::copy_n(rk_.b, rk_.stages, b_of_all.begin());
   of_step_ = integrated(b_of_all.data());
   if (rk_.gamma) {
-    rosenbrock_.emplace(mechanism, rk_, dynamics_);
     for (int i = 0; i < rk_.stages; ++i) {
       std::array<double, Method::kMaxStages> of_k{};
       for (int j = 0; j < i; ++j) of_k[static_cast<std::size_t>(j)] = rk_.gamma_of(i, j) / rk_.gamma_of(0, 0);
@@ -32,10 +27,6 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     for (LaneRows* x : {&s_, &zero_}) x->setZero(states, kLanes);
   }
   const int coupled = largest_implicit_group(rk_);
-  if (coupled > 0) {
-    equations_.emplace(dynamics_.in_space());
-    implicit_.emplace(d, rk_);
-  }
   for (ParameterBlock& p : parameter_blocks(d)) {
     Block b;
     b.parameters = std::move(p);
@@ -49,9 +40,8 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     }
     blocks_.push_back(std::move(b));
   }
-  y_.setZero(states), ydot_.setZero(states), y_bar_.setZero(states);
+  ydot_.setZero(states);
   seen_.reserve(static_cast<std::size_t>(states));
-  rho_bar_.setZero(d.rho.size());
   r_.setZero(StageEquations::count(d), kLanes);
   y_rho_.setZero(states, d.rho.size());
 }
@@ -85,21 +75,17 @@ void TangentSweep::add_stages(const Block& b, double h, double c, const Weights&
                              from.data() + half, to.data(), to.data() + half);
 }
 
-void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,
-                            Eigen::Index objective, Eigen::MatrixXd& psi_rho) {
-  y_bar_.setZero();
-  rho_bar_.setZero();
-  cost.add_gradient(at, weight, y_bar_, rho_bar_);
-  psi_rho.row(objective) += rho_bar_.transpose();
+void TangentSweep::add_gradient(LaneRows Block::*direction, Eigen::Index objective) {
+  psi_rho_.row(objective) += g_rho_.transpose();
   seen_.clear();  // most objectives look at few bodies
-  for (Eigen::Index i = 0; i < y_bar_.size(); ++i) {
-    if (y_bar_(i) != 0) seen_.push_back(i);
+  for (Eigen::Index i = 0; i < g_y_.size(); ++i) {
+    if (g_y_(i) != 0) seen_.push_back(i);
   }
   for (const Block& b : blocks_) {
     Lanes<1> change = Lanes<1>::Zero();
-    for (const Eigen::Index i : seen_) change += y_bar_(i) * (b.*direction).row(i);
+    for (const Eigen::Index i : seen_) change += g_y_(i) * (b.*direction).row(i);
     for (int k = 0; k < kLanes; ++k) {
-      if (b.parameters.parameter[k] >= 0) psi_rho(objective, b.parameters.parameter[k]) += change(k);
+      if (b.parameters.parameter[k] >= 0) psi_rho_(objective, b.parameters.parameter[k]) += change(k);
     }
   }
 }
@@ -111,38 +97,32 @@ void TangentSweep::set_inside(const Step& step, double theta) {
   for (Block& b : blocks_) add_stages(b, step.h, w.c, w, 0, rk_.dense_stages - 1, b.y0, b.Y);
 }
 
-void TangentSweep::set_dense(const Step& step, double theta) {
-  set_inside(step, theta);
-  const double blend = projection_blend(theta);
-  for (Block& b : blocks_) b.Y += blend * (b.y1 - b.y_hat);
-}
-
-void TangentSweep::take_samples(const Step& step, std::span<const SampleEvent> events, const TangentSampling& sampling,
-                                Eigen::MatrixXd& psi_rho) {
+void TangentSweep::take_samples(const Step& step, std::span<const SampleEvent> events) {
   for (const SampleEvent& e : events) {
     const double theta = (e.time - step.t) / step.h;
     dense_output(rk_, step, theta, y_);
-    set_dense(step, theta);
+    set_inside(step, theta);
+    const double blend = projection_blend(theta);
+    for (Block& b : blocks_) b.Y += blend * (b.y1 - b.y_hat);
     StatePoint at{e.time, y_, step.angles0, motion()};
     if (e.cost) {
-      add_cost(*e.cost, at, 1, &Block::Y, e.objective, psi_rho);
-    } else {
-      dense_output_rate(rk_, step, theta, ydot_);
-      at.ydot = &ydot_;
-      for (const Block& b : blocks_) {
-        for (int k = 0; k < kLanes; ++k) {
-          if (b.parameters.parameter[k] >= 0) y_rho_.col(b.parameters.parameter[k]) = b.Y.col(k);
-        }
-      }
-      sampling.observe(e.index, at, y_rho_);
+      set_gradient(*e.cost, at, 1);
+      add_gradient(&Block::Y, e.objective);
+      continue;
     }
+    dense_output_rate(rk_, step, theta, ydot_);
+    at.ydot = &ydot_;
+    for (const Block& b : blocks_) {
+      for (int k = 0; k < kLanes; ++k) {
+        if (b.parameters.parameter[k] >= 0) y_rho_.col(b.parameters.parameter[k]) = b.Y.col(k);
+      }
+    }
+    sampling_.observe(e.index, at, y_rho_);
   }
 }
 
 bool TangentSweep::follow_explicit(const Step& step, int i) {
-  y_ = step.Y.col(i);
-  const auto a_i = step.K.col(i).tail(mechanism_.states() / 2);
-  if (!dynamics_.linearise(step.t + rk_.c[i] * step.h, y_, step.angles0, a_i, step.lambda.col(i))) return false;
+  if (!linearise_stage(step, i)) return false;
   const std::size_t stage = static_cast<std::size_t>(i);
   const Weights& w = of_stage_[stage];
   for (Block& b : blocks_) {
@@ -159,12 +139,10 @@ bool TangentSweep::follow_implicit(const Step& step, const StageGroup& g) {
   const auto of = [](int i) { return static_cast<std::size_t>(i); };
   for (int i = g.first; i <= g.last; ++i) {
     const int k = i - g.first;
-    y_ = step.Y.col(i);
-    equations_->place_at(step.t + rk_.c[i] * step.h, y_, step.angles0, step.K.col(i).tail(n), step.lambda.col(i));
-    implicit_->linearise(*equations_, k);
+    StageEquations& equations = implicit_->linearise(step, i, k);
     for (Block& b : blocks_) {
       add_stages(b, step.h, of_stage_[of(i)].c, of_stage_[of(i)], 0, g.first - 1, b.y0, b.Y_stage[of(k)]);
-      equations_->tangent(b.parameters, b.Y_stage[of(k)], r_);
+      equations.tangent(b.parameters, b.Y_stage[of(k)], r_);
       b.x.middleRows(k * rows, rows) = r_;
     }
   }
@@ -227,26 +205,19 @@ bool TangentSweep::follow_rosenbrock(const Step& step) {
   return true;
 }
 
-void TangentSweep::add_running_costs(const Step& step, int node, std::span<const Cost> costs,
-                                     Eigen::MatrixXd& psi_rho) {
+// At a node, where the directions are in Block::Y.
+void TangentSweep::add_running_costs(const Step& step, int node) {
   node_state(rk_, step, node, y_);
-  if (watch_) node_rate(rk_, step, node, ydot_);
-  for (std::size_t o = 0; o < costs.size(); ++o) {
-    if (!costs[o].running) continue;
-    const double weight = step.h * rk_.node_b[node];
-    add_cost(*costs[o].running, {step.t + rk_.node_c[node] * step.h, y_, step.angles0, motion()}, weight, &Block::Y,
-             static_cast<Eigen::Index>(o), psi_rho);
-    if (watch_) watch_->take(o, node, weight, y_bar_, ydot_, rho_bar_);
-  }
+  for (std::size_t o = 0; o < costs_.size(); ++o)
+    if (set_running_gradient(step, o, node)) add_gradient(&Block::Y, static_cast<Eigen::Index>(o));
 }
 
-bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::span<const SampleEvent> events,
-                          const TangentSampling& sampling, Eigen::MatrixXd& psi_rho) {
+bool TangentSweep::follow(const Step& step, std::span<const SampleEvent> events) {
   if (rosenbrock_) {
     if (!follow_rosenbrock(step)) return false;
     for (int m = 0; m < rk_.nodes; ++m) {
       set_inside(step, rk_.node_c[m]);
-      add_running_costs(step, m, costs, psi_rho);
+      add_running_costs(step, m);
     }
   }
   for (const StageGroup& g : step.dense ? rk_.stage_groups() : rk_.stage_groups_of_step()) {
@@ -258,10 +229,10 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
       if (implicit) {
         for (Block& b : blocks_) b.Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
       }
-      add_running_costs(step, i, costs, psi_rho);
+      add_running_costs(step, i);
     }
   }
-  if (watch_) watch_->end_step(step);
+  end_step(step);
   for (Block& b : blocks_) add_stages(b, step.h, of_step_.c, of_step_, 0, rk_.stages - 1, b.y0, b.y_hat);
   if (projector_->active()) {
     if (!projector_->linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;
@@ -269,7 +240,7 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
   } else {
     for (Block& b : blocks_) b.y1 = b.y_hat;
   }
-  take_samples(step, events, sampling, psi_rho);
+  take_samples(step, events);
   const double largest_of_y = step.y1.cwiseAbs().maxCoeff();
   for (Block& b : blocks_) {
     b.y0 = b.y1;
@@ -281,11 +252,11 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
   return true;
 }
 
-void TangentSweep::finish(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
-                          std::span<const Cost> costs, Eigen::MatrixXd& psi_rho) {
-  for (std::size_t o = 0; o < costs.size(); ++o) {
-    if (!costs[o].terminal) continue;
-    add_cost(*costs[o].terminal, {t, y, angles, motion()}, 1, &Block::y0, static_cast<Eigen::Index>(o), psi_rho);
+void TangentSweep::finish(const StatePoint& end) {
+  for (std::size_t o = 0; o < costs_.size(); ++o) {
+    if (!costs_[o].terminal) continue;
+    set_gradient(*costs_[o].terminal, end, 1);
+    add_gradient(&Block::y0, static_cast<Eigen::Index>(o));
   }
 }
 

@@ -8,46 +8,26 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
-#include "core/dynamics/dynamics.hpp"
-#include "core/dynamics/motion_solver.hpp"
-#include "core/integrate/gradient_quadrature.hpp"
-#include "core/run/cost.hpp"
+#include "core/integrate/sweep.hpp"
 #include "core/run/sample_schedule.hpp"
-#include "core/run/simulation_result.hpp"
-#include "core/scene/settings.hpp"
-#include "core/step/linearised_stages.hpp"
-#include "core/step/rosenbrock_stages.hpp"
-#include "core/step/step.hpp"
 
 namespace mbsopt {
 
-class Mechanism;
-
-class TangentSweep {
+class TangentSweep : public Sweep {
  public:
-  // watch: gets the gradients of running costs; may be null.
+  // The derivatives of the costs are added to psi_rho.
   TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
-               const Eigen::MatrixXd& y_initial_rho, GradientQuadrature* watch);
+               std::span<const Cost> costs, const TangentSampling& sampling, const Eigen::MatrixXd& y_initial_rho,
+               bool watched, Eigen::MatrixXd& psi_rho);
 
-  // Advances over one step; adds the costs' derivatives to psi_rho. False where a factorisation failed.
-  bool follow(const Step& step, std::span<const Cost> costs, std::span<const SampleEvent> events,
-              const TangentSampling& sampling, Eigen::MatrixXd& psi_rho);
-  // Adds the terminal costs' derivatives; call once, after the last step.
-  void finish(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, std::span<const Cost> costs,
-              Eigen::MatrixXd& psi_rho);
+  // Advances over one step. False where a factorisation failed.
+  bool follow(const Step& step, std::span<const SampleEvent> events);
+  // Adds the terminal costs; call once, after the last step.
+  void finish(const StatePoint& end);
 
   // The largest change of the state by a change of a parameter, both relative, over all steps.
   double magnification() const { return magnification_; }
-  long linearised_states() const {
-    return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0) +
-           (rosenbrock_ ? rosenbrock_->linearised_states() : 0);
-  }
-  long factorisations() {
-    return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0) +
-           (rosenbrock_ ? rosenbrock_->factorisations() : 0);
-  }
 
  private:
   struct Block {
@@ -71,31 +51,20 @@ class TangentSweep {
   bool follow_implicit(const Step& step, const StageGroup& group);
   bool follow_rosenbrock(const Step& step);
   void set_inside(const Step& step, double theta);  // Block::Y = y0' + h sum_i b_i(theta) k_i'
-  // At a node, where the directions are in Block::Y.
-  void add_running_costs(const Step& step, int node, std::span<const Cost> costs, Eigen::MatrixXd& psi_rho);
-  void add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,
-                Eigen::Index objective, Eigen::MatrixXd& psi_rho);
-  void set_dense(const Step& step, double theta);  // into Block::Y
-  void take_samples(const Step& step, std::span<const SampleEvent> events, const TangentSampling& sampling,
-                    Eigen::MatrixXd& psi_rho);
+  void add_running_costs(const Step& step, int node);
+  // psi_rho of an objective += g_y' direction + g_rho
+  void add_gradient(LaneRows Block::*direction, Eigen::Index objective);
+  void take_samples(const Step& step, std::span<const SampleEvent> events);
 
-  const Mechanism mechanism_;
-  const Method& rk_;
-  MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
-  std::optional<MotionSolver> motion_;  // where some sensor needs it
-  Dynamics dynamics_;
-  std::unique_ptr<Projector> projector_;
-  std::optional<StageEquations> equations_;  // of implicit stages
-  std::optional<LinearisedStages> implicit_;
-  std::optional<RosenbrockStages> rosenbrock_;
+  const TangentSampling& sampling_;
+  Eigen::MatrixXd& psi_rho_;
   std::vector<Weights> of_stage_;  // A
   std::vector<Weights> of_s_;      // gamma_ij/gamma_ii, j < i
   Weights of_step_;                // b
   std::vector<Block> blocks_;
-  Eigen::VectorXd y_, ydot_, y_bar_, rho_bar_;
-  std::vector<Eigen::Index> seen_;  // entries of y_bar_ that are not zero
+  Eigen::VectorXd ydot_;
+  std::vector<Eigen::Index> seen_;  // entries of g_y_ that are not zero
   Eigen::MatrixXd y_rho_;
-  GradientQuadrature* watch_;
   LaneRows r_, a_, s_, zero_;
   double magnification_ = 0;
 };

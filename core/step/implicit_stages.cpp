@@ -60,10 +60,14 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
   y_.setZero(layout_.size());
 }
 
-long ImplicitStages::factorisations() const {
-  long sum = filter_ ? filter_->factorisations() : 0;
-  for (const Matrix& m : matrices_) sum += m.matrix.factorisations();
-  return sum;
+void ImplicitStages::add_to(SimulationStatistics& s) const {
+  s.rhs_evaluations += evaluations_;
+  s.newton_iterations += iterations_;
+  s.linear_solves += iterations_ + filters_;
+  s.linearised_states += equations_.places();
+  s.jacobians += jacobians_ + own_jacobians_;
+  if (filter_) s.factorisations += filter_->factorisations();
+  for (const Matrix& m : matrices_) s.factorisations += m.matrix.factorisations();
 }
 
 void ImplicitStages::begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/body/state_layout.hpp"
+#include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
 #include "core/step/component_tolerances.hpp"
 #include "core/step/shifted_system.hpp"
@@ -52,12 +53,7 @@ class ImplicitStages {
   // Fastest contraction is left alone while the step changes by less than this.
   static constexpr double kKeepStep = 1.2;
 
-  long evaluations() const { return evaluations_; }
-  long iterations() const { return iterations_; }         // of Newton's method
-  long solves() const { return iterations_ + filters_; }  // of linear systems
-  long places() const { return equations_.places(); }     // of stages where something was evaluated
-  long jacobians() const { return jacobians_ + own_jacobians_; }
-  long factorisations() const;
+  void add_to(SimulationStatistics& statistics) const;  // the work so far
 
  private:
   struct Matrix {  // of one distinct block of A

@@ -4,7 +4,8 @@
 
 namespace mbsopt {
 
-LinearisedStages::LinearisedStages(const MechanismData& data, const Method& method) : rk_(method), jacobian_(data) {
+LinearisedStages::LinearisedStages(const MechanismData& data, const Method& method, SpatialDynamics& dynamics)
+    : rk_(method), equations_(dynamics), jacobian_(data) {
   values_.assign(static_cast<std::size_t>(largest_implicit_group(method)), jacobian_.values());
   for (const MotionJacobian::Values& v : values_) pointers_.push_back(&v);
   std::vector<int> sizes;
@@ -17,6 +18,18 @@ LinearisedStages::LinearisedStages(const MechanismData& data, const Method& meth
     matrices_.emplace_back(data, jacobian_, stages);
     A_.push_back(Eigen::MatrixXd::Zero(stages, stages));
   }
+}
+
+StageEquations& LinearisedStages::place_at(const Step& step, int i) {
+  y_ = step.Y.col(i);
+  equations_.place_at(step.t + rk_.c[i] * step.h, y_, step.angles0, step.K.col(i).tail(y_.size() / 2),
+                      step.lambda.col(i));
+  return equations_;
+}
+
+StageEquations& LinearisedStages::linearise(const Step& step, int stage, int k) {
+  jacobian_.evaluate(place_at(step, stage), values_[static_cast<std::size_t>(k)]);
+  return equations_;
 }
 
 std::size_t LinearisedStages::of(const StageGroup& group) const {

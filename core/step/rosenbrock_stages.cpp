@@ -35,14 +35,11 @@ bool RosenbrockStages::solve(Step& step) {
   }
   if (!matrix_.factor(h * g, values_)) return false;
   for (int i = 0; i < rk_.stages; ++i) {
-    StageSum of_Y, of_s;
-    for (int j = 0; j < i; ++j) {
-      of_Y.add(h * rk_.a(i, j), step.K.col(j).data());
-      of_s.add(rk_.gamma_of(i, j) / g, step.K.col(j).data());
-    }
-    of_Y.to(step.y0.data(), y_.data(), y_.size());
+    sum_stages(
+        step.K, i, [&](int j) { return h * rk_.a(i, j); }, step.y0, y_);
     s_.setZero();
-    of_s.to(s_.data(), s_.data(), s_.size());
+    add_stages(
+        step.K, i, [&](int j) { return rk_.gamma_of(i, j) / g; }, s_);
     step.Y.col(i) = y_;
     if (i == 0) {
       x_ = f_;

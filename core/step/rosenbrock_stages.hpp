@@ -20,6 +20,7 @@
 #include <array>
 
 #include "core/dynamics/dynamics.hpp"
+#include "core/run/simulation_result.hpp"
 #include "core/step/shifted_system.hpp"
 #include "core/step/step.hpp"
 
@@ -49,9 +50,12 @@ class RosenbrockStages {
   static constexpr double common_weight(int k) { return kWeights[static_cast<std::size_t>(k)] / kSpacing; }
   static constexpr double own_weight(int sign) { return sign * 0.5 / kSpacing; }
 
-  long evaluations() const { return evaluations_; }
-  long jacobians() const { return jacobians_; }
-  long solves() const { return solves_; }
+  void add_to(SimulationStatistics& statistics) const {  // the work of begin() and the first solve()
+    statistics.rhs_evaluations += evaluations_;
+    statistics.linear_solves += evaluations_ + solves_;
+    statistics.jacobians += jacobians_;
+    statistics.factorisations += factorisations();
+  }
   long linearised_states() const { return linearised_; }
   long factorisations() const { return matrix_.factorisations(); }
 

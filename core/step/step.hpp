@@ -29,12 +29,30 @@ struct Step {
 // Makes a step with the sizes of the mechanism. projection: has the right sizes.
 Step make_step(const Mechanism& mechanism, const Method& rk, ProjectionSolution projection);
 
+// y = y0 + sum_{i < stages} c(i) k_i, of `size` numbers from row `first` of K on.
+template <class Coefficient>
+void sum_stages(const Eigen::MatrixXd& K, int stages, Coefficient&& c, const double* y0, double* y, Eigen::Index size,
+                Eigen::Index first = 0) {
+  StageSum sum;
+  for (int i = 0; i < stages; ++i) sum.add(c(i), K.col(i).data() + first);
+  sum.to(y0, y, size);
+}
+// The same of whole states.
+template <class Coefficient>
+void sum_stages(const Eigen::MatrixXd& K, int stages, Coefficient&& c, const Eigen::VectorXd& y0, Eigen::VectorXd& y) {
+  sum_stages(K, stages, c, y0.data(), y.data(), y.size());
+}
+// y += sum_{i < stages} c(i) k_i
+template <class Coefficient>
+void add_stages(const Eigen::MatrixXd& K, int stages, Coefficient&& c, Eigen::VectorXd& y) {
+  sum_stages(K, stages, c, y, y);
+}
+
 // The upper half of k_i of a Rosenbrock method, from the lower halves of k_0..k_i.
 inline void set_rosenbrock_rates(const Method& rk, int i, double h, const Eigen::VectorXd& y0, Eigen::MatrixXd& K) {
   const Eigen::Index n = y0.size() / 2;
-  StageSum sum;
-  for (int j = 0; j <= i; ++j) sum.add(h * rk.beta(i, j), K.col(j).data() + n);
-  sum.to(y0.data() + n, K.col(i).data(), n);
+  sum_stages(
+      K, i + 1, [&](int j) { return h * rk.beta(i, j); }, y0.data() + n, K.col(i).data(), n, n);
 }
 
 // Stage states Y and the upper half (v) of their derivatives K, from the lower half (qdd) of K, for a group whose
@@ -43,20 +61,19 @@ inline void set_rosenbrock_rates(const Method& rk, int i, double h, const Eigen:
 inline void set_group_stages(const Method& rk, const StageGroup& g, double h, const Eigen::VectorXd& y0,
                              Eigen::MatrixXd& Y, Eigen::MatrixXd& K) {
   const Eigen::Index n = y0.size() / 2;
-  auto add_stages = [&](int i, Eigen::Index first) {
-    StageSum sum;
-    for (int j = 0; j <= g.last; ++j) sum.add(h * rk.a(i, j), K.col(j).data() + first);
-    sum.to(y0.data() + first, Y.col(i).data() + first, n);
+  const auto set_half = [&](int i, Eigen::Index first) {
+    const auto c = [&](int j) { return h * rk.a(i, j); };
+    sum_stages(K, g.last + 1, c, y0.data() + first, Y.col(i).data() + first, n, first);
   };
   for (int i = g.first; i <= g.last; ++i) {
-    add_stages(i, n);
+    set_half(i, n);
     if (rk.gamma) {
       set_rosenbrock_rates(rk, i, h, y0, K);
     } else {
       K.col(i).head(n) = Y.col(i).tail(n);
     }
   }
-  for (int i = g.first; i <= g.last; ++i) add_stages(i, 0);
+  for (int i = g.first; i <= g.last; ++i) set_half(i, 0);
 }
 
 // y(t + theta h) = y0 + h sum_i b_i(theta) k_i + blend(theta) (y1 - y_hat): the last term spreads the projection over
@@ -65,17 +82,15 @@ inline double projection_blend(double theta) { return theta * theta * (3 - 2 * t
 
 inline void dense_output(const Method& rk, const Step& step, double theta, Eigen::VectorXd& y) {
   y = step.y0 + projection_blend(theta) * (step.y1 - step.y_hat);
-  StageSum sum;
-  for (int i = 0; i < rk.dense_stages; ++i) sum.add(step.h * rk.dense_weight(i, theta), step.K.col(i).data());
-  sum.to(y.data(), y.data(), y.size());
+  add_stages(
+      step.K, rk.dense_stages, [&](int i) { return step.h * rk.dense_weight(i, theta); }, y);
 }
 
 // Its derivative in t.
 inline void dense_output_rate(const Method& rk, const Step& step, double theta, Eigen::VectorXd& ydot) {
   ydot = (6 * theta * (1 - theta) / step.h) * (step.y1 - step.y_hat);
-  StageSum sum;
-  for (int i = 0; i < rk.dense_stages; ++i) sum.add(rk.dense_weight_rate(i, theta), step.K.col(i).data());
-  sum.to(ydot.data(), ydot.data(), ydot.size());
+  add_stages(
+      step.K, rk.dense_stages, [&](int i) { return rk.dense_weight_rate(i, theta); }, ydot);
 }
 
 // The state at node m of a running cost, and its derivative in t.
@@ -84,9 +99,8 @@ inline void node_state(const Method& rk, const Step& step, int m, Eigen::VectorX
     y = step.Y.col(m);
     return;
   }
-  StageSum sum;
-  for (int i = 0; i < rk.stages; ++i) sum.add(step.h * rk.dense_weight(i, rk.node_c[m]), step.K.col(i).data());
-  sum.to(step.y0.data(), y.data(), y.size());
+  sum_stages(
+      step.K, rk.stages, [&](int i) { return step.h * rk.dense_weight(i, rk.node_c[m]); }, step.y0, y);
 }
 inline void node_rate(const Method& rk, const Step& step, int m, Eigen::VectorXd& ydot) {
   if (!rk.gamma) {
@@ -94,9 +108,8 @@ inline void node_rate(const Method& rk, const Step& step, int m, Eigen::VectorXd
     return;
   }
   ydot.setZero();
-  StageSum sum;
-  for (int i = 0; i < rk.stages; ++i) sum.add(rk.dense_weight_rate(i, rk.node_c[m]), step.K.col(i).data());
-  sum.to(ydot.data(), ydot.data(), ydot.size());
+  add_stages(
+      step.K, rk.stages, [&](int i) { return rk.dense_weight_rate(i, rk.node_c[m]); }, ydot);
 }
 
 }  // namespace mbsopt

@@ -101,12 +101,13 @@ void JumpWatch::set_inputs(const Function& f, const StatePoint& at) {
   }
 }
 
-void JumpWatch::begin(const StatePoint& at) {
+std::string JumpWatch::begin(const StatePoint& at) {
   t0_ = at.t, y0_ = at.y, angles_ = at.angles;
   for (Function& f : functions_) {
-    set_inputs(f, at);
+    set_inputs(f, {at.t, at.y, at.angles, motion_});
     for (Switch& s : f.switches) s.last = sign_of(s.program.value(inputs_, scratch_));
   }
+  return {};
 }
 
 void JumpWatch::place_at(double theta) {
@@ -160,8 +161,9 @@ bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
   return true;
 }
 
-void JumpWatch::look_at(const StatePoint& at) {
-  if (at.t < t0_ + apart_) return;
+std::string JumpWatch::look_at(const SeenStep& step) {
+  const StatePoint& at = step.to;
+  if (at.t < t0_ + apart_) return {};
   t1_ = at.t, y1_ = at.y;
   look_at_directions();
   for (Function& f : functions_) {
@@ -180,6 +182,7 @@ void JumpWatch::look_at(const StatePoint& at) {
     if (found) std::erase_if(f.switches, [&](const Switch& s) { return !f.is_new(s); });
   }
   t0_ = t1_, y0_ = y1_, angles_ = at.angles;
+  return {};
 }
 
 void JumpWatch::look_at_directions() {
@@ -196,7 +199,5 @@ void JumpWatch::look_at_directions() {
     found_.push_back({Jump::Owner::force, f.force, {}, 0, t1_, {}, true});
   }
 }
-
-void JumpWatch::add_to(SimulationStatistics& statistics) const { statistics.jumps = found_; }
 
 }  // namespace mbsopt

@@ -12,8 +12,7 @@
 // size 0. So is a spring near zero length that turns by more than 60 degrees in a step. Whether gradients are wrong is
 // for others to decide (gradient_doubts.hpp).
 //
-//   JumpWatch watch(mechanism, settings, costs, motion);   // in runs with derivatives
-//   watch.begin({t0, y0, angles0}); watch.look_at({t1, y1, angles1}); ... watch.add_to(result.statistics);
+// Runs with derivatives have this watch.
 #pragma once
 
 #include <span>
@@ -24,19 +23,19 @@
 #include "core/force/force_inputs.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/run/cost.hpp"
-#include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
+#include "core/watch/step_observer.hpp"
 
 namespace mbsopt {
 
-class JumpWatch {
+class JumpWatch final : public StepObserver {
  public:
   JumpWatch(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
             MotionSource* motion);
 
-  void begin(const StatePoint& at);
-  void look_at(const StatePoint& at);  // after each step
-  void add_to(SimulationStatistics& statistics) const;
+  std::string begin(const StatePoint& at) override;
+  std::string look_at(const SeenStep& step) override;
+  void add_to(SimulationStatistics& statistics) override { statistics.jumps = found_; }
 
  private:
   enum class Inputs { sensors, law, time };  // the inputs beside parameters and t

@@ -6,21 +6,21 @@
 // v_hat: before projection; v0, v1: at the ends of the step. If nothing moves, loads would move it as gravity g does.
 #pragma once
 
-#include "core/step/step.hpp"
+#include "core/watch/step_observer.hpp"
 
 namespace mbsopt {
 
 struct MechanismData;
 
-class PenaltyWatch {
+class PenaltyWatch final : public StepObserver {
  public:
-  explicit PenaltyWatch(const MechanismData& data) : data_(&data) {}
+  explicit PenaltyWatch(const MechanismData& data) : data_(data) {}
 
-  void add(const Step& step);
-  double projected_share() const { return moved_ > 0 ? projected_ / moved_ : 0; }
+  std::string look_at(const SeenStep& step) override;
+  void add_to(SimulationStatistics& statistics) override;  // the share, as a residual of the accelerations
 
  private:
-  const MechanismData* data_;
+  const MechanismData& data_;
   double projected_ = 0, moved_ = 0;
 };
 

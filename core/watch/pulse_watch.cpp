@@ -33,9 +33,9 @@ std::vector<QuadratureNode> pulse_nodes(const Method& method) {
   return nodes;
 }
 
-PulseWatch::PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
+PulseWatch::PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end, double rtol,
                        std::vector<QuadratureNode> nodes)
-    : nodes_(std::move(nodes)), inputs_(timed_inputs(mechanism)) {
+    : rtol_(rtol), nodes_(std::move(nodes)), inputs_(timed_inputs(mechanism)) {
   const std::vector<KinkedSignal>& signals = mechanism.data().kinks;
   for (std::size_t k = 0; k < signals.size(); ++k)
     functions_.push_back({{.signal = static_cast<int>(k)}, {}, signals[k].curve, signals[k].delay, {}});
@@ -99,9 +99,9 @@ PulseWatch::Integrals PulseWatch::integrals_to(const Function& f, double t) {
   return {f.until[low].f + sign * rest.f, f.until[low].ft + sign * rest.ft};
 }
 
-void PulseWatch::look_at(Function& f, double t, double h, bool noticed) {
+PulseWatch::Doubt PulseWatch::doubt(Function& f, double t, double h, bool noticed) {
   while (f.next < f.size() && f.t(f.next) <= t) ++f.next;
-  if (f.next + 1 >= f.size() || f.t(f.next + 1) >= t + h) return;  // no piece lies inside
+  if (f.next + 1 >= f.size() || f.t(f.next + 1) >= t + h) return {};  // no piece lies inside
   if (f.until.empty()) integrate(f);
   double mean = 0, so_far = 0, null = 0;
   for (const QuadratureNode& n : nodes_) {
@@ -113,7 +113,7 @@ void PulseWatch::look_at(Function& f, double t, double h, bool noticed) {
   const double at_end = std::abs(i1.f - i0.f - h * mean);
   const double in_mean = std::abs(((t + h) * (i1.f - i0.f) - (i1.ft - i0.ft)) / h - h * so_far);
   const double missed = std::max(at_end, in_mean), seen = h * std::abs(null);
-  if (!(noticed ? at_end > (f.curve ? 1 : kShareOfLaw) * seen || in_mean > seen : missed > f.largest)) return;
+  if (!(noticed ? at_end > (f.curve ? 1 : kShareOfLaw) * seen || in_mean > seen : missed > f.largest)) return {};
   const auto differs = [&](std::size_t i) {
     return std::abs((f.until[i + 1].f - f.until[i].f) / (f.t(i + 1) - f.t(i)) - mean);
   };
@@ -125,17 +125,24 @@ void PulseWatch::look_at(Function& f, double t, double h, bool noticed) {
   for (std::size_t i = piece + 1; i <= last && beside == t; ++i)
     if (std::abs(value(f, f.t(i)) - mean) <= 0.5 * std::abs(peak - mean)) beside = f.t(i);
   const double change = std::abs(peak - value(f, beside));
-  if (!(change > 0)) return;
+  if (!(change > 0)) return {};
   if (!noticed) f.largest = 2 * missed;
-  f.pulse.t = at;
   const bool is_cost = !f.curve && f.pulse.force < 0 && f.pulse.drive < 0;
-  doubts_.push_back({f.pulse, at, beside, missed / change, is_cost ? missed / f.of_size : 0});
+  return {at, beside, missed / change, is_cost ? missed / f.of_size : 0};
 }
 
-const std::vector<PulseWatch::Doubt>& PulseWatch::doubts(double t, double h, bool noticed) {
-  doubts_.clear();
-  for (Function& f : functions_) look_at(f, t, h, noticed);
-  return doubts_;
+Pulse PulseWatch::worst(double t, double h, bool noticed, const Change& change) {
+  Pulse worst;
+  for (Function& f : functions_) {
+    const Doubt d = doubt(f, t, h, noticed);
+    if (!(d.duration > 0)) continue;
+    const double error = d.share > 0 ? d.share / rtol_ : change(d.at, d.beside, d.duration);
+    if (!(error > worst.error)) continue;
+    worst = f.pulse;
+    worst.t = d.at;
+    worst.error = error;
+  }
+  return worst;
 }
 
 }  // namespace mbsopt

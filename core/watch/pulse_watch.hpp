@@ -10,10 +10,11 @@
 // (f(t*) - f(t')). So a rough record costs nothing where nodes notice it, and a pulse below the tolerances costs two
 // evaluations. A running cost misses D itself.
 //
-//   PulseWatch watch(mechanism, costs, start, end, pulse_nodes(method));
-//   for (const PulseWatch::Doubt& doubt : watch.doubts(t, h)) ...
+//   PulseWatch watch(mechanism, costs, start, end, rtol, pulse_nodes(method));
+//   if (watch.worst(t, h, true, change).error > PulseWatch::kMissed) // try a shorter step
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -30,21 +31,20 @@ std::vector<QuadratureNode> pulse_nodes(const Method& method);
 
 class PulseWatch {
  public:
-  PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end,
+  PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end, double rtol,
              std::vector<QuadratureNode> nodes);
 
   // The instants at which laws and running costs jump.
   std::vector<double> jumps() const;
 
-  struct Doubt {
-    Pulse pulse;        // without its error
-    double at, beside;  // t* and t' [s]
-    double duration;    // D/|f(t*) - f(t')|  [s]
-    double share;       // D of the integral of |f| over the run: of a running cost, else 0
-  };
-  // The functions in doubt over a step. Steps begin later than, or where, those before began. noticed: what nodes
-  // notice is rejected elsewhere. The result holds until the next call.
-  const std::vector<Doubt>& doubts(double t, double h, bool noticed = true);
+  // A step that misses so much [tolerances] is too long: its own estimate errs by less. Steps below a part of the run
+  // do not search for pulses.
+  static constexpr double kMissed = 10, kShortest = 1e-10;
+  // The change of velocity [tolerances] if the accelerations at t* and t' differ for a duration [s].
+  using Change = std::function<double(double at, double beside, double duration)>;
+  // The pulse that the step misses most, with its error in tolerances; 0: none. Steps begin later than, or where, those
+  // before began. noticed: what nodes notice is rejected elsewhere.
+  Pulse worst(double t, double h, bool noticed, const Change& change);
 
  private:
   struct Integrals {
@@ -67,13 +67,18 @@ class PulseWatch {
   Integrals integrals(const Function& f, double from, double to);  // where f is smooth
   Integrals integrals_to(const Function& f, double t);
   void integrate(Function& f);
-  void look_at(Function& f, double t, double h, bool noticed);
+  struct Doubt {
+    double at = 0, beside = 0;  // t* and t' [s]
+    double duration = 0;        // D/|f(t*) - f(t')|  [s]; 0: there is no doubt
+    double share = 0;           // D of the integral of |f| over the run: of a running cost, else 0
+  };
+  Doubt doubt(Function& f, double t, double h, bool noticed);
 
+  const double rtol_;
   const std::vector<QuadratureNode> nodes_;
   std::vector<Function> functions_;
   std::vector<double> inputs_;
   Program::Scratch scratch_;
-  std::vector<Doubt> doubts_;
 };
 
 }  // namespace mbsopt

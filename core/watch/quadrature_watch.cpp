@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/body/hermite.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
 namespace {
@@ -45,48 +46,80 @@ std::vector<QuadratureNode> quadrature_nodes(int n, const double* c, const doubl
   return nodes;
 }
 
-QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion)
-    : method_(method),
+QuadratureWatch::QuadratureWatch(const Mechanism& mechanism, const Method& method, std::span<const Cost> costs, Of what,
+                                 MotionSource* motion)
+    : mechanism_(mechanism),
+      method_(method),
       costs_(costs),
+      of_values_(what == Of::values),
       motion_(motion),
       nodes_(quadrature_nodes(method.nodes, method.node_c, method.node_b, node_of_)),
-      integrals_(kIntegrals * costs.size()),
-      g_(nodes_.size()) {}
+      integrals_((of_values_ ? 1 : 2) * costs.size()),
+      g_(integrals_.size() * static_cast<std::size_t>(method.nodes), 0.0),
+      distinct_(nodes_.size()) {
+  if (of_values_) return;
+  influence_.setZero(mechanism.states(), static_cast<Eigen::Index>(costs.size()));
+  fastest_.setZero(mechanism.states());
+}
 
-std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g, Integrand what) {
+void QuadratureWatch::take_gradient(std::size_t cost, int node, double weight, VecIn y_bar, VecIn ydot, VecIn rho_bar) {
+  const Eigen::VectorXd& rho = mechanism_.rho();
+  double along_parameters = 0;
+  for (const int p : mechanism_.data().active)  // a parameter of value 0 counts with the size 1
+    along_parameters += rho_bar(p) * (rho(p) == 0 ? 1 : rho(p));
+  influence_.col(static_cast<Eigen::Index>(cost)) += y_bar.cwiseAbs();
+  fastest_ = fastest_.cwiseMax(ydot.cwiseAbs());
+  at_node(0, cost, node) = y_bar.dot(ydot) / weight;
+  at_node(1, cost, node) = along_parameters / weight;
+}
+
+std::string QuadratureWatch::end_step(const Step& step) {
   if (start_ == end_) start_ = end_ = step.t;
   start_ = std::min(start_, step.t), end_ = std::max(end_, step.t + step.h);
-  Integral& integral = integrals_[kIntegrals * cost + static_cast<std::size_t>(what)];
-  std::fill(g_.begin(), g_.end(), 0.0);
-  for (std::size_t i = 0; i < g.size(); ++i) {
-    if (node_of_[i] < 0) continue;
-    const std::size_t node = static_cast<std::size_t>(node_of_[i]);
-    g_[node] += method_.node_b[i] / nodes_[node].b * g[i];
+  for (std::size_t o = 0; o < costs_.size(); ++o) {
+    if (!costs_[o].running) continue;
+    const double error = add_error(step, 0, o);
+    if (!of_values_) {
+      add_error(step, 1, o);
+      continue;
+    }
+    Integral& integral = integrals_[o];
+    if (costs_[o].is_extreme || !(error > kPoor * integral.of_size) || integral.searches++ > kMostSearches) continue;
+    const double t = pole(step, *costs_[o].running);
+    if (std::isnan(t)) continue;
+    return fmt::format(
+        "the running cost{} grows about like 1/|t - {:.6g} s| or faster near t = {:.6g} s, so that its integral does "
+        "not exist: keep its denominators away from zero, or end the run before",
+        costs_[o].name.empty() ? "" : " of objective '" + costs_[o].name + "'", t, t);
+  }
+  return {};
+}
+
+double QuadratureWatch::add_error(const Step& step, std::size_t integrand, std::size_t cost) {
+  Integral& integral = integrals_[place(integrand, cost)];
+  std::fill(distinct_.begin(), distinct_.end(), 0.0);
+  for (int i = 0; i < method_.nodes; ++i) {
+    if (node_of_[static_cast<std::size_t>(i)] < 0) continue;
+    const std::size_t node = static_cast<std::size_t>(node_of_[static_cast<std::size_t>(i)]);
+    distinct_[node] += method_.node_b[i] / nodes_[node].b * at_node(integrand, cost, i);
   }
   double size = 0, difference = 0;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    size += step.h * std::abs(nodes_[k].b * g_[k]), difference += step.h * nodes_[k].e * g_[k];
+    size += step.h * std::abs(nodes_[k].b * distinct_[k]), difference += step.h * nodes_[k].e * distinct_[k];
   }
   int power = static_cast<int>(nodes_.size()) - 1;
   if (power == 0) {
-    difference = integral.of_size > 0 ? step.h * 0.5 * (g_[0] - integral.last_g) : 0;
-    integral.last_g = g_[0];
+    difference = integral.of_size > 0 ? step.h * 0.5 * (distinct_[0] - integral.last_g) : 0;
+    integral.last_g = distinct_[0];
     power = 1;
   }
-  if (!(size > 0 && std::isfinite(size))) return {};  // the end of the run reports it
+  if (!(size > 0 && std::isfinite(size))) return 0;  // the end of the run reports it
   integral.of_size += size;
   const double share = std::min(1.0, std::abs(difference) / size);
   const double error = size * std::pow(share, static_cast<double>(method_.order) / power);
   integral.error += error;
   if (error > integral.worst) integral.worst = error, integral.worst_t = step.t;
-  if (what != Integrand::value || costs_[cost].is_extreme) return {};
-  if (!(error > kPoor * integral.of_size) || integral.searches++ > kMostSearches) return {};
-  const double t = pole(step, *costs_[cost].running);
-  if (std::isnan(t)) return {};
-  return fmt::format(
-      "the running cost{} grows about like 1/|t - {:.6g} s| or faster near t = {:.6g} s, so that its integral does not "
-      "exist: keep its denominators away from zero, or end the run before",
-      costs_[cost].name.empty() ? "" : " of objective '" + costs_[cost].name + "'", t, t);
+  return error;
 }
 
 // The time of a pole within the step, or kNone.
@@ -119,11 +152,6 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
   return step.t + at * h;
 }
 
-void QuadratureWatch::count_at_least(std::size_t cost, Integrand what, double size) {
-  double& of_size = integrals_[kIntegrals * cost + static_cast<std::size_t>(what)].of_size;
-  of_size = std::max(of_size, size);
-}
-
 void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
   // Errors up to `rounding` have no meaning.
   const auto judge = [](const Integral& i, double of_size, double rounding, const Cost& cost, QuadratureError& worst) {
@@ -131,17 +159,22 @@ void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
   };
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     const Cost& cost = costs_[o];
-    const Integral& value = integrals_[kIntegrals * o];
-    // Exponentials have any size, so their rounding is relative.
-    const double rounding = cost.is_extreme ? kMetExactly * value.of_size : kMetExactly;
-    judge(value, value.of_size, rounding, cost,
-          cost.is_extreme ? statistics.extreme_quadrature : statistics.quadrature);
+    if (of_values_) {
+      const Integral& value = integrals_[o];
+      // Exponentials have any size, so their rounding is relative.
+      const double rounding = cost.is_extreme ? kMetExactly * value.of_size : kMetExactly;
+      judge(value, value.of_size, rounding, cost,
+            cost.is_extreme ? statistics.extreme_quadrature : statistics.quadrature);
+      continue;
+    }
     // Both parts count relative to their sum: a part that is negligible beside the other does not matter.
-    Integral motion = integrals_[kIntegrals * o + 1];
-    const Integral& parameters = integrals_[kIntegrals * o + 2];
-    motion.error *= end_ - start_, motion.of_size *= end_ - start_;
+    Integral motion = integrals_[place(0, o)];
+    const Integral& parameters = integrals_[place(1, o)];
+    const double influence = influence_.col(static_cast<Eigen::Index>(o)).dot(fastest_);
+    motion.error *= end_ - start_, motion.of_size = std::max(motion.of_size, influence) * (end_ - start_);
     for (const Integral* part : {static_cast<const Integral*>(&motion), &parameters})
-      judge(*part, motion.of_size + parameters.of_size, rounding, cost, statistics.gradient_quadrature);
+      judge(*part, motion.of_size + parameters.of_size, cost.is_extreme ? 0 : kMetExactly, cost,
+            statistics.gradient_quadrature);
   }
 }
 

@@ -10,11 +10,15 @@
 //
 // Derivatives of psi are integrals of g_y y' + g_rho. They may be unresolved where g is not (sqrt(|x|) through zero).
 // Only one of the two sweeps knows the directions y'. Instead, ydot and rho replace them: the errors of g_y ydot and
-// g_rho rho are estimated like that of g (gradient_quadrature.hpp).
+// g_rho rho are estimated like that of g. Both sweeps compute these gradients at each node.
 //
-// If the error is large, the watch searches for a pole. It halves the interval around the largest |g| along the step's
-// Hermite cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has no
-// integral.
+// If the error of g is large, the watch searches for a pole. It halves the interval around the largest |g| along the
+// step's Hermite cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has
+// no integral.
+//
+//   QuadratureWatch watch(mechanism, method, costs, QuadratureWatch::Of::gradients, nullptr);
+//   watch.take_gradient(objective, node, h * b, y_bar, ydot, rho_bar);  // after add_gradient(at, h * b, y_bar,
+//   rho_bar) watch.end_step(step); ... watch.add_to(result.statistics);
 #pragma once
 
 #include <Eigen/Core>
@@ -22,6 +26,7 @@
 #include <string>
 #include <vector>
 
+#include "core/mechanism/mechanism.hpp"
 #include "core/run/cost.hpp"
 #include "core/run/simulation_result.hpp"
 #include "core/step/step.hpp"
@@ -37,17 +42,16 @@ std::vector<QuadratureNode> quadrature_nodes(int n, const double* c, const doubl
 
 class QuadratureWatch {
  public:
-  QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion);
+  enum class Of { values, gradients };
+  QuadratureWatch(const Mechanism& mechanism, const Method& method, std::span<const Cost> costs, Of what,
+                  MotionSource* motion);
 
-  enum class Integrand { value, along_motion, along_parameters };  // g, g_y ydot, g_rho rho
-  static constexpr std::size_t kIntegrals = 3;                     // of each cost
-
-  // Call this after each step with the integrand of each running cost at each node (Method::nodes). Returns a reason to
-  // end the run, in words, or an empty string.
-  std::string look_at(const Step& step, std::size_t cost, std::span<const double> g, Integrand what = Integrand::value);
-
-  // The integral counts as one of this size, if it is smaller.
-  void count_at_least(std::size_t cost, Integrand what, double size);
+  // The integrand of a running cost at a node of the step (Method::nodes).
+  void take_value(std::size_t cost, int node, double g) { at_node(0, cost, node) = g; }
+  // y_bar, rho_bar: weight times its gradient; ydot: at the node.
+  void take_gradient(std::size_t cost, int node, double weight, VecIn y_bar, VecIn ydot, VecIn rho_bar);
+  // Call this after all nodes of a step, in any order of steps. Returns a reason to end the run, in words, or nothing.
+  std::string end_step(const Step& step);
   void add_to(SimulationStatistics& statistics) const;
 
  private:
@@ -57,16 +61,28 @@ class QuadratureWatch {
     double last_g = 0;              // of the step before, for methods of one node
     int searches = 0;               // for poles
   };
+  // Integrands of values: g. Integrands of gradients: g_y ydot and g_rho rho.
+  std::size_t place(std::size_t integrand, std::size_t cost) const { return integrand * costs_.size() + cost; }
+  double& at_node(std::size_t integrand, std::size_t cost, int node) {
+    return g_[place(integrand, cost) * static_cast<std::size_t>(method_.nodes) + static_cast<std::size_t>(node)];
+  }
+  double add_error(const Step& step, std::size_t integrand, std::size_t cost);  // returns that of this step
   double pole(const Step& step, const PointCost& cost);
 
+  const Mechanism mechanism_;
   const Method& method_;
   std::span<const Cost> costs_;
+  const bool of_values_;
   MotionSource* motion_;
   std::vector<int> node_of_;
   const std::vector<QuadratureNode> nodes_;
   std::vector<Integral> integrals_;
-  double start_ = 0, end_ = 0;  // of all steps [s], which go forward or backward
-  std::vector<double> g_;       // at the nodes
+  double start_ = 0, end_ = 0;    // of all steps [s], which go forward or backward
+  std::vector<double> g_;         // at each node, of each integrand
+  std::vector<double> distinct_;  // at the distinct nodes, of one integrand
+  // The state may rest after a blow that its derivatives outlast: int |g_y|, per cost, counts by the fastest ydot.
+  Eigen::MatrixXd influence_;
+  Eigen::VectorXd fastest_;
   Eigen::VectorXd y_;
 };
 

@@ -43,20 +43,34 @@ double size_of(const Energy& e) { return e.kinetic + std::abs(e.potential); }
 
 }  // namespace
 
-RunGuard::RunGuard(const MechanismData& data)
-    : data_(data), conserves_energy_(conserves_energy(data)), law_jumps_(data) {}
+RunGuard::RunGuard(const MechanismData& data, Projector& projector, double t_end, long max_steps, bool objects)
+    : data_(data),
+      projector_(projector),
+      t_end_(t_end),
+      max_steps_(max_steps),
+      objects_(objects),
+      conserves_energy_(conserves_energy(data)),
+      law_jumps_(data) {}
 
-std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps) {
-  before_t_ = last_t_ = t;
-  energy_initial_ = energy.kinetic + energy.potential;
-  energy_drift_ = 0;
-  energy_largest_ = size_of(energy);
+std::string RunGuard::begin(const StatePoint& start) {
+  const Eigen::VectorXd& y = start.y;
+  before_t_ = last_t_ = start.t;
+  last_y_ = y;
+  const Energy e = energy(data_, y, start.angles);
+  energy_initial_ = energy_final_ = e.kinetic + e.potential;
+  if (!objects_) return {};
+  energy_largest_ = size_of(e);
   bounds_ = {kFastest, kFastestTurn};
   for (int i = 1; i <= data_.n; ++i) bounds_ = bounds_.cwiseMax(kGrowth * speeds(y, i, data_.n));
   energy_natural_ = conserves_energy_ ? natural_energy(data_, y) : 0.0;
+  const std::string words = about_turns(start);
+  return words.empty() ? past_half_turn(data_, y, start.t, y) : words;
+}
+
+std::string RunGuard::about_turns(const StatePoint& start) const {
   for (int i = 1; i <= data_.n; ++i) {
-    const double omega = speeds(y, i, data_.n)(1);
-    if (!(omega * (t_end - t) > std::numbers::pi * static_cast<double>(max_steps))) continue;
+    const double omega = speeds(start.y, i, data_.n)(1);
+    if (!(omega * (t_end_ - start.t) > std::numbers::pi * static_cast<double>(max_steps_))) continue;
     const std::string& body = data_.body_names[static_cast<std::size_t>(i)];
     if (!std::isfinite(omega))
       return fmt::format("body '{}' has an angular velocity at the start that is too large for a number", body);
@@ -64,26 +78,20 @@ std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& en
         "body '{}' turns at {:.3g} rad/s at the start. Each half turn takes a step at least, and until t = {:.6g} s "
         "there are more of them than simulation.integrator.max_steps, {}. Is the angular velocity in rad/s, and the "
         "end in s?",
-        body, omega, t_end, max_steps);
+        body, omega, t_end_, max_steps_);
   }
-  last_y_ = y;
-  return past_half_turn(data_, y, t, y);
+  return {};
 }
 
 std::string RunGuard::about_energy(double t, const Energy& energy) {
   energy_largest_ = std::max(energy_largest_, size_of(energy));
-  const double now = energy.kinetic + energy.potential, grown = now - energy_initial_;
-  energy_drift_ = std::max(energy_drift_, std::abs(grown));
+  const double now = energy_final_, grown = now - energy_initial_;
   if (!(grown > kGrown * energy_largest_ && grown > kNoticeableChange * energy_natural_)) return {};
   return fmt::format(
       "the energy has grown from {:.3g} J to {:.3g} J at t = {:.6g} s, although nothing does work: the steps are too "
       "large for this motion. Use a smaller simulation.integrator.step, or an adaptive integrator with smaller rtol "
       "and atol",
       energy_initial_, now, t);
-}
-
-double RunGuard::relative_energy_drift() const {
-  return energy_drift_ > kNoticeableChange * energy_natural_ ? energy_drift_ / energy_largest_ : 0;
 }
 
 std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {
@@ -102,23 +110,42 @@ std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {
   return {};
 }
 
-std::string RunGuard::objection(double t, const Eigen::VectorXd& y, const Energy& energy,
-                                double acceleration_residual) {
+std::string RunGuard::look_at(const SeenStep& step) {
+  const auto& [t, y, angles, motion, ydot] = step.to;
+  double relative = 0;
+  position_violation_ = std::max(position_violation_, projector_.position_violation(t, angles, y, &relative));
+  relative_violation_ = std::max(relative_violation_, relative);
+  velocity_violation_ = std::max(velocity_violation_, projector_.velocity_violation(t, y));
+  const Energy e = energy(data_, y, angles);
+  energy_final_ = e.kinetic + e.potential;
+  energy_drift_ = std::max(energy_drift_, std::abs(energy_final_ - energy_initial_));
+  if (!objects_) return {};
   std::string words = law_jumps_.between(before_t_, t);  // from one step before: this one may begin at a jump
   before_t_ = last_t_, last_t_ = t;
-  if (words.empty() && acceleration_residual > kUnmetAcceleration) {
+  if (words.empty() && step.worst_residual > kUnmetAcceleration) {
     words = fmt::format(
         "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: the linkage locks there (a "
         "drive, or the motion itself, asks for more than it reaches), or its position is singular. If it should go "
         "on, look at lengths and laws; if masses differ by many orders, use a larger simulation.formulation.alpha "
         "(relative; 1e8 is the default) or more iterations",
-        acceleration_residual, t);
+        step.worst_residual, t);
   }
-  if (words.empty() && conserves_energy_) words = about_energy(t, energy);
+  if (words.empty() && conserves_energy_) words = about_energy(t, e);
   if (words.empty()) words = about_speed(t, y);
   if (words.empty()) words = past_half_turn(data_, last_y_, t, y);
   last_y_ = y;
   return words;
+}
+
+void RunGuard::add_to(SimulationStatistics& s) {
+  s.energy_initial = energy_initial_;
+  s.energy_final = energy_final_;
+  s.energy_drift = energy_drift_;
+  if (objects_ && conserves_energy_ && energy_drift_ > kNoticeableChange * energy_natural_)
+    s.relative_energy_drift = energy_drift_ / energy_largest_;
+  s.max_position_violation = position_violation_;
+  s.relative_position_violation = relative_violation_;
+  s.max_velocity_violation = velocity_violation_;
 }
 
 }  // namespace mbsopt

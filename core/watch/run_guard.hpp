@@ -5,41 +5,45 @@
 //   - the accelerations of the constraints were not met
 //   - a body is faster than any real one
 //   - a bushing has reached half a turn, where its torque jumps (bushing.hpp)
+// It also notes the energy and how far the state is from the constraints.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/projection/projection.hpp"
 #include "core/start/law_jumps.hpp"
+#include "core/watch/step_observer.hpp"
 
 namespace mbsopt {
 
-class RunGuard {
+class RunGuard final : public StepObserver {
  public:
-  explicit RunGuard(const MechanismData& data);
+  // A run to t_end in at most max_steps steps, of which each half turn of a body takes at least one. The projector only
+  // measures violations. Without `objects` there are no objections: given steps have been judged where they were found.
+  RunGuard(const MechanismData& data, Projector& projector, double t_end, long max_steps, bool objects = true);
 
-  // Call this at the start of a run to t_end in at most max_steps steps. It needs at least one step in each half turn
-  // of a body. Returns an objection or an empty string.
-  std::string begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps);
-  // Call this after a step with its end, the state and the energy there, and the largest relative residual of the
-  // constraints' accelerations so far. Returns an objection or an empty string.
-  std::string objection(double t, const Eigen::VectorXd& y, const Energy& energy, double acceleration_residual);
-
-  // The largest change of the energy relative to the largest energy, if nothing does work; else 0.
-  double relative_energy_drift() const;
+  std::string begin(const StatePoint& start) override;
+  std::string look_at(const SeenStep& step) override;
+  void add_to(SimulationStatistics& statistics) override;
 
  private:
+  std::string about_turns(const StatePoint& start) const;
   std::string about_energy(double t, const Energy& energy);
   std::string about_speed(double t, const Eigen::VectorXd& y) const;
 
   const MechanismData& data_;
-  bool conserves_energy_;
+  Projector& projector_;
+  const double t_end_;
+  const long max_steps_;
+  const bool objects_, conserves_energy_;
   LawJumps law_jumps_;
   double last_t_ = 0, before_t_ = 0;
   Eigen::VectorXd last_y_;
   double energy_initial_ = 0, energy_largest_ = 0, energy_natural_ = 0;  // natural: of weights and springs [J]
-  double energy_drift_ = 0;
+  double energy_final_ = 0, energy_drift_ = 0;
+  double position_violation_ = 0, relative_violation_ = 0, velocity_violation_ = 0;
   Eigen::Vector2d bounds_;  // of the speed of a centre of mass [m/s] and of turning [rad/s]
 };
 

@@ -51,13 +51,15 @@ StiffnessWatch::StiffnessWatch(const Method& rk, Eigen::Index states) {
   if (pair_ == Pair::across_steps) Y_last_.setZero(states), K_last_.setZero(states);
 }
 
-void StiffnessWatch::look_at(const Step& step) {
+std::string StiffnessWatch::look_at(const SeenStep& seen) {
+  const Step& step = *seen.stages;
   if (pair_ == Pair::in_step)
     compare(step.Y.col(first_), step.K.col(first_), step.Y.col(second_), step.K.col(second_), step.h);
-  if (pair_ != Pair::across_steps) return;
+  if (pair_ != Pair::across_steps) return {};
   if (h_last_ > 0 && t_last_ == step.t) compare(Y_last_, K_last_, step.Y.col(0), step.K.col(0), h_last_);
   Y_last_ = step.Y.col(second_), K_last_ = step.K.col(second_);
   t_last_ = step.t1, h_last_ = step.h;
+  return {};
 }
 
 void StiffnessWatch::compare(const Eigen::Ref<const Eigen::VectorXd>& Y_a, const Eigen::Ref<const Eigen::VectorXd>& K_a,
@@ -73,7 +75,7 @@ void StiffnessWatch::compare(const Eigen::Ref<const Eigen::VectorXd>& Y_a, const
   stiffest_ = std::max(stiffest_, rate);
 }
 
-void StiffnessWatch::add_to(SimulationStatistics& statistics) const {
+void StiffnessWatch::add_to(SimulationStatistics& statistics) {
   statistics.watched_steps += watched_;
   statistics.stability_limited_steps += limited_;
   statistics.stiffest_rate = std::max(statistics.stiffest_rate, stiffest_);

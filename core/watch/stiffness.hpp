@@ -16,15 +16,14 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "core/run/simulation_result.hpp"
-#include "core/step/step.hpp"
+#include "core/watch/step_observer.hpp"
 
 namespace mbsopt {
 
 // The largest x with |R(-x')| <= 1 for all x' in [0, x], for explicit methods.
 double real_stability_boundary(const Method& rk);
 
-class StiffnessWatch {
+class StiffnessWatch final : public StepObserver {
  public:
   // Limits of h |lambda| in limited steps, as parts of the boundary. Step-size control varies it about and below the
   // boundary.
@@ -32,8 +31,8 @@ class StiffnessWatch {
 
   StiffnessWatch(const Method& rk, Eigen::Index states);
 
-  void look_at(const Step& accepted);
-  void add_to(SimulationStatistics& statistics) const;
+  std::string look_at(const SeenStep& step) override;
+  void add_to(SimulationStatistics& statistics) override;
 
  private:
   void compare(const Eigen::Ref<const Eigen::VectorXd>& Y_a, const Eigen::Ref<const Eigen::VectorXd>& K_a,

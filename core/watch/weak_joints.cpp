@@ -28,6 +28,12 @@ double error_of_weak_joints(const Mechanism& mechanism, const FormulationSetting
   return size > 0 ? (ydot - firm).tail(half).lpNorm<Eigen::Infinity>() / size : 0;
 }
 
+void add_residuals(const Mechanism& mechanism, const FormulationSettings& settings, double worst_residual,
+                   const StatePoint& end, SimulationStatistics& s) {
+  s.weak_joints_error = error_of_weak_joints(mechanism, settings, worst_residual, end.t, end.y, end.angles);
+  s.max_acceleration_residual = std::max({s.max_acceleration_residual, worst_residual, s.weak_joints_error});
+}
+
 std::string weak_joints_objection(double error) {
   constexpr double kRough = 1e-2;
   if (!(error > kRough)) return {};

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/mechanism/mechanism.hpp"
+#include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
 
 namespace mbsopt {
@@ -18,6 +19,9 @@ namespace mbsopt {
 // nothing.
 double error_of_weak_joints(const Mechanism& mechanism, const FormulationSettings& settings, double worst_residual,
                             double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+// Adds this error at the end of a run, and the worst residual, to the statistics.
+void add_residuals(const Mechanism& mechanism, const FormulationSettings& settings, double worst_residual,
+                   const StatePoint& end, SimulationStatistics& statistics);
 // A message for an error that makes accelerations too rough for normal steps; empty for a smaller one.
 std::string weak_joints_objection(double error);
 

@@ -1,7 +1,7 @@
 // The hot loops allocate nothing after set-up: right-hand sides, steps, tangents and adjoints.
 #include <catch2/catch.hpp>
 
-#include "core/cvodes/cvodes_newton.hpp"
+#include "core/cvodes/cvodes_linear_solver.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
 #include "core/projection/projection.hpp"
@@ -27,6 +27,27 @@ struct Prepared {
     for (int i = 1; i <= 3; ++i) y.segment<7>(7 * (i - 1)) = mechanism.data().bodies[static_cast<std::size_t>(i)].q;
   }
 };
+
+// The allocations of a run whose every step has dense output, with its result.
+std::pair<long, SimulationStatistics> allocations_of_run(const Mechanism& mechanism, const SimulationSettings& settings,
+                                                         const char* method, const VectorXd& y,
+                                                         const VectorXd& angles) {
+  struct Reader final : StepObserver {
+    bool reads_inside(double) const override { return true; }
+    std::string look_at(const SeenStep&) override { return {}; }
+  } reader;
+  StepObserver* const observer = &reader;
+  StepAttempt attempt(mechanism, settings, *runge_kutta_method(method));
+  SimulationResult result;
+  result.steps.times.reserve(100000);  // all that may differ is the growth of the recorded list of steps
+  result.steps.sizes.reserve(100000);
+  const RunOptions options;
+  const long before = allocation_count();
+  RungeKuttaRun(attempt, {}, options, result).go(y, angles, {&observer, 1});
+  const long after = allocation_count();
+  REQUIRE(result.ok());
+  return {after - before, result.statistics};
+}
 
 }  // namespace
 
@@ -98,25 +119,16 @@ TEST_CASE("a projection, its tangent and its adjoint allocate nothing", "[alloca
 TEST_CASE("steps allocate nothing after the first, whatever their number", "[allocation]") {
   Prepared p;
   const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "sdirk4", "rodas4", "radau5");
-  // The same motion over two spans: all that may differ is the growth of the recorded list of steps.
-  auto allocations = [&](double end) {
+  auto allocations = [&](double end) {  // the same motion over two spans
     SimulationSettings settings = p.scene.simulation;
     settings.end_time = end;
     settings.formulation.projection = Projection::position_velocity;
-    RungeKuttaRun run(p.mechanism, settings, *runge_kutta_method(method));
-    SimulationResult result;
-    result.steps.times.reserve(100000);
-    result.steps.sizes.reserve(100000);
     const std::unique_ptr<Projector> projector = make_projector(p.mechanism, Projection::position_velocity);
     ProjectionSolution solution = projector->solution();
     VectorXd y = p.y;
     REQUIRE(projector->project(0, p.angles, p.y, y, solution));
-    const long before = allocation_count();
-    run.run(
-        y, p.angles, [](double) { return true; }, {}, {}, result);
-    const long count = allocation_count() - before;
-    REQUIRE(result.ok());
-    return std::pair(count, result.statistics.steps);
+    const auto [allocated, statistics] = allocations_of_run(p.mechanism, settings, method.c_str(), y, p.angles);
+    return std::pair(allocated, statistics.steps);
   };
   const auto [few, few_steps] = allocations(0.05);
   const auto [many, many_steps] = allocations(0.5);
@@ -133,16 +145,9 @@ TEST_CASE("steps past singular positions allocate nothing", "[allocation][singul
   auto allocations = [&](double end) {
     SimulationSettings settings = scene.simulation;
     settings.end_time = end;
-    RungeKuttaRun run(mechanism, settings, *runge_kutta_method("dopri853"));
-    SimulationResult result;
-    result.steps.times.reserve(100000);
-    result.steps.sizes.reserve(100000);
-    const long before = allocation_count();
-    run.run(
-        assembly.result().y, VectorXd(), [](double) { return true; }, {}, {}, result);
-    const long count = allocation_count() - before;
-    REQUIRE(result.ok());
-    return std::pair(count, result.statistics.rejected);
+    const auto [allocated, statistics] =
+        allocations_of_run(mechanism, settings, "dopri853", assembly.result().y, VectorXd());
+    return std::pair(allocated, statistics.rejected);
   };
   const auto [few, none] = allocations(0.3);
   const auto [many, rejected] = allocations(5);

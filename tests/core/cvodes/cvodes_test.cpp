@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 #include <limits>
 
-#include "core/cvodes/cvodes_newton.hpp"
+#include "core/cvodes/cvodes_linear_solver.hpp"
 #include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"

@@ -53,9 +53,12 @@ struct CountedRun {
     Outcome outcome;
     long next = steps - 1;
     const bool done = checkpoints.go_back(
-        [&](const Snapshot& from, long last, const auto&, const auto& sink) {
+        [&](const Snapshot& from, long last, StepObserver& sink) {
           outcome.right = outcome.right && from.y0(0) == static_cast<double>(from.step) && last > from.step;
-          for (long i = from.step; i < last; ++i) sink(step(i));
+          for (long i = from.step; i < last; ++i) {
+            const Step s = step(i);
+            sink.look_at({{s.t, s.y0, s.angles0}, {s.t1, s.y1, s.angles1}, 0, &s});
+          }
           return true;
         },
         [&](const StoredStep& s) {

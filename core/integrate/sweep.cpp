@@ -1,0 +1,55 @@
+#include "core/integrate/sweep.hpp"
+
+#include "core/integrate/model_choice.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+
+Sweep::Sweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
+             std::span<const Cost> costs, bool watched)
+    : mechanism_(mechanism),
+      rk_(method),
+      costs_(costs),
+      dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
+      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))) {
+  const MechanismData& d = mechanism.data();
+  if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
+  if (watched) watch_.emplace(mechanism, method, costs, QuadratureWatch::Of::gradients, nullptr);
+  if (largest_implicit_group(rk_) > 0) implicit_.emplace(d, rk_, dynamics_.in_space());
+  if (rk_.gamma) rosenbrock_.emplace(mechanism, rk_, dynamics_);
+  for (Eigen::VectorXd* x : {&y_, &ydot_, &g_y_}) x->setZero(mechanism.states());
+  g_rho_.setZero(d.rho.size());
+}
+
+bool Sweep::linearise_stage(const Step& step, int i) {
+  y_ = step.Y.col(i);
+  const double t = step.t + rk_.c[i] * step.h;
+  return dynamics_.linearise(t, y_, step.angles0, step.K.col(i).tail(y_.size() / 2), step.lambda.col(i));
+}
+
+void Sweep::set_gradient(const PointCost& cost, const StatePoint& at, double weight) {
+  g_y_.setZero();
+  g_rho_.setZero();
+  cost.add_gradient(at, weight, g_y_, g_rho_);
+}
+
+bool Sweep::set_running_gradient(const Step& step, std::size_t objective, int node) {
+  const PointCost* const running = costs_[objective].running.get();
+  if (!running || node >= rk_.nodes || rk_.node_b[node] == 0) return false;
+  const double weight = step.h * rk_.node_b[node];
+  set_gradient(*running, {step.t + rk_.node_c[node] * step.h, y_, step.angles0, motion()}, weight);
+  if (!watch_) return true;
+  node_rate(rk_, step, node, ydot_);
+  watch_->take_gradient(objective, node, weight, g_y_, ydot_, g_rho_);
+  return true;
+}
+
+void Sweep::add_to(SimulationStatistics& s) const {
+  if (watch_) watch_->add_to(s);
+  s.linearised_states += dynamics_.linearised_states() + (implicit_ ? implicit_->places() : 0) +
+                         (rosenbrock_ ? rosenbrock_->linearised_states() : 0);
+  s.factorisations += dynamics_.factorisations() + projector_->factorisations() +
+                      (implicit_ ? implicit_->factorisations() : 0) + (rosenbrock_ ? rosenbrock_->factorisations() : 0);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,57 @@
+// What the tangent-linear and the adjoint sweep share: the equations of a step, linearised where it was solved, and the
+// gradients of running costs at its nodes.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/motion_solver.hpp"
+#include "core/run/cost.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/scene/settings.hpp"
+#include "core/step/linearised_stages.hpp"
+#include "core/step/rosenbrock_stages.hpp"
+#include "core/step/step.hpp"
+#include "core/watch/quadrature_watch.hpp"
+
+namespace mbsopt {
+
+class Sweep {
+ public:
+  // Adds the work, and integrals in the derivatives that the steps do not resolve.
+  void add_to(SimulationStatistics& statistics) const;
+
+ protected:
+  // Without `watched`, nothing looks at the integrals.
+  Sweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
+        std::span<const Cost> costs, bool watched);
+  ~Sweep() = default;
+
+  bool linearise_stage(const Step& step, int i);  // an explicit one; y_ becomes its state
+  // The gradient of a cost times a weight, into g_y_ and g_rho_.
+  void set_gradient(const PointCost& cost, const StatePoint& at, double weight);
+  // The same of a running cost at a node of the step, whose state is y_; false: there is nothing to add.
+  bool set_running_gradient(const Step& step, std::size_t objective, int node);
+  void end_step(const Step& step) {
+    if (watch_) watch_->end_step(step);
+  }
+  MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
+
+  const Mechanism mechanism_;
+  const Method& rk_;
+  std::span<const Cost> costs_;
+  Dynamics dynamics_;
+  std::unique_ptr<Projector> projector_;
+  std::optional<LinearisedStages> implicit_;
+  std::optional<RosenbrockStages> rosenbrock_;
+  Eigen::VectorXd y_, g_y_, g_rho_;
+
+ private:
+  std::optional<MotionSolver> motion_;  // where some sensor needs it
+  std::optional<QuadratureWatch> watch_;
+  Eigen::VectorXd ydot_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,66 @@
+// What looks at a run while it goes on. All of it has one signature, by whatever method the run is integrated:
+//
+//   begin(start)        at the start of the run
+//   split(step)         each step that could be accepted: where it should end instead
+//   look_at(step)       each accepted step
+//   add_to(statistics)  after the last one
+//
+// A run asks its observers in the order of their list. An objection, in words, ends the run.
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/mechanism/state_point.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/step/step.hpp"
+
+namespace mbsopt {
+
+struct SeenStep {
+  StatePoint from, to;           // its ends
+  double worst_residual = 0;     // of the constraints' accelerations so far, relative
+  const Step* stages = nullptr;  // of a Runge-Kutta method; null for CVODES
+};
+
+class StepObserver {
+ public:
+  virtual ~StepObserver() = default;
+  // Returns an objection to the start, or nothing.
+  virtual std::string begin(const StatePoint&) { return {}; }
+  // Whether it reads states within a step that ends at t1, which need the stages of dense output.
+  virtual bool reads_inside(double /*t1*/) const { return false; }
+  // The instant at which this step should end, if that is before its end. Runge-Kutta methods then try the shorter
+  // step, which is shown again. Given steps are not split.
+  virtual double split(const SeenStep&) { return INFINITY; }
+  // Returns an objection to this step, or nothing.
+  virtual std::string look_at(const SeenStep& step) = 0;
+  virtual void add_to(SimulationStatistics&) {}
+};
+
+// The first objection of the observers to the start of a run, or to a step.
+inline std::string objection_to_start(const std::vector<StepObserver*>& observers, const StatePoint& start) {
+  for (StepObserver* const observer : observers)
+    if (std::string words = observer->begin(start); !words.empty()) return words;
+  return {};
+}
+inline std::string objection_to(const SeenStep& step, const std::vector<StepObserver*>& observers) {
+  for (StepObserver* const observer : observers)
+    if (std::string words = observer->look_at(step); !words.empty()) return words;
+  return {};
+}
+
+// A function as an observer of accepted steps.
+template <class Function>
+class ObserverOf final : public StepObserver {
+ public:
+  explicit ObserverOf(Function f) : f_(std::move(f)) {}
+  std::string look_at(const SeenStep& step) override { return f_(step); }
+
+ private:
+  Function f_;
+};
+
+}  // namespace mbsopt
