@@ -6,28 +6,12 @@
 
 namespace mbsopt::cvodes {
 
-NewtonMatrix::NewtonMatrix(Flow& flow)
-    : flow_(flow),
-      equations_(flow.dynamics()),
-      jacobian_(flow.data()),
-      values_(jacobian_.values()),
-      system_(flow.data(), jacobian_),
-      y_(StateLayout{flow.data().n}.size()) {}
-
-bool NewtonMatrix::linearise(double t, const Flow::Numbers& y) {
-  if (!flow_.linearise(t, y)) return false;
-  y_ = y;
-  equations_.place_at(t, y_, flow_.angles_at(t), flow_.ydot().tail(y_.size() / 2), flow_.dynamics().lambda());
-  jacobian_.evaluate(equations_, values_);
-  return true;
-}
-
 LinearSolver::LinearSolver(Flow& flow, const Context& context)
     : flow_(flow),
-      matrix_(flow),
+      matrix_(flow.data(), flow.dynamics()),
+      y_(StateLayout{flow.data().n}.size()),
       solver_(SUNLinSolNewEmpty(context)),
-      handle_(SUNMatNewEmpty(context)),
-      states_(StateLayout{flow.data().n}.size()) {
+      handle_(SUNMatNewEmpty(context)) {
   if (!solver_ || !handle_) throw std::bad_alloc();
   solver_->content = this;
   solver_->ops->gettype = [](SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; };
@@ -39,25 +23,33 @@ LinearSolver::LinearSolver(Flow& flow, const Context& context)
   handle_->ops->getid = [](SUNMatrix) { return SUNMATRIX_CUSTOM; };
 }
 
+bool LinearSolver::linearise(double t, const Flow::Numbers& y) {
+  if (!flow_.linearise(t, y)) return false;
+  y_ = y;
+  matrix_.linearise(t, y_, flow_.angles_at(t), flow_.ydot().tail(y_.size() / 2), flow_.dynamics().lambda());
+  return true;
+}
+
 int LinearSolver::set_up(double t, const Flow::Numbers& y, bool keep_jacobian, booleantype* jacobian_is_new,
                          double gamma) {
   constexpr int kRetry = 1;  // CVODES tries a smaller step
   *jacobian_is_new = keep_jacobian ? SUNFALSE : SUNTRUE;
   return flow_.thrown().keep([&] {
-    if (!keep_jacobian && !matrix_.linearise(t, y)) return kRetry;
+    if (!keep_jacobian && !linearise(t, y)) return kRetry;
     return matrix_.factor(gamma) ? 0 : kRetry;
   });
 }
 
 int LinearSolver::solve(N_Vector x, N_Vector b) {
+  constexpr int kRefinements = 1;  // CVODES takes the solution as exact
   Eigen::Map<Eigen::VectorXd> out = values(x);
   out = values(b);
-  for (Eigen::Index first = 0; first < out.size(); first += states_) {
+  for (Eigen::Index first = 0; first < out.size(); first += y_.size()) {
     ++solves_;
     if (backward_) {
-      matrix_.solve_transposed(out.segment(first, states_));
+      matrix_.solve_transposed(out.segment(first, y_.size()), kRefinements);
     } else {
-      matrix_.solve(out.segment(first, states_));
+      matrix_.solve(out.segment(first, y_.size()), kRefinements);
     }
   }
   return 0;

@@ -15,29 +15,6 @@
 
 namespace mbsopt::cvodes {
 
-// I - gamma f_y and its transpose, at a state of the flow (shifted_system.hpp).
-class NewtonMatrix {
- public:
-  explicit NewtonMatrix(Flow& flow);
-  NewtonMatrix(const NewtonMatrix&) = delete;  // its system refers to its Jacobian
-  NewtonMatrix& operator=(const NewtonMatrix&) = delete;
-
-  bool linearise(double t, const Flow::Numbers& y);                     // f_y at this state
-  bool factor(double gamma) { return system_.factor(gamma, values_); }  // false: it is not finite, or singular
-  // x is the right-hand side on entry and the solution on return. It is refined once, because CVODES takes it as exact.
-  void solve(Eigen::Ref<Eigen::VectorXd> x) { system_.solve(x, 1); }
-  void solve_transposed(Eigen::Ref<Eigen::VectorXd> x) { system_.solve_transposed(x, 1); }
-  long factorisations() const { return system_.factorisations(); }
-
- private:
-  Flow& flow_;
-  StageEquations equations_;
-  MotionJacobian jacobian_;
-  MotionJacobian::Values values_;
-  ShiftedSystem system_;
-  Eigen::VectorXd y_;
-};
-
 class LinearSolver {
  public:
   LinearSolver(Flow& flow, const Context& context);
@@ -57,16 +34,17 @@ class LinearSolver {
     void operator()(SUNMatrix m) const { SUNMatFreeEmpty(m); }
   };
   static LinearSolver& of(SUNMatrix A) { return *static_cast<LinearSolver*>(A->content); }
+  bool linearise(double t, const Flow::Numbers& y);
   int set_up(double t, const Flow::Numbers& y, bool keep_jacobian, booleantype* jacobian_is_new, double gamma);
   int solve(N_Vector x, N_Vector b);
 
   Flow& flow_;
-  NewtonMatrix matrix_;
+  ShiftedSystem matrix_;
+  Eigen::VectorXd y_;
   std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeSolver> solver_;
   std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix> handle_;
   bool backward_ = false;
   long solves_ = 0;
-  Eigen::Index states_;
 };
 
 }  // namespace mbsopt::cvodes

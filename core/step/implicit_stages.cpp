@@ -25,9 +25,7 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
       rk_(method),
       settings_(settings),
       tolerances_(data_, settings),
-      equations_(dynamics),
-      jacobian_(data_),
-      values_(jacobian_.values()) {
+      start_(data_, dynamics) {
   int largest = 0;
   for (const StageGroup& g : rk_.stage_groups()) {
     int found = -1;
@@ -41,17 +39,14 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
       }
       if (found < 0) {
         found = static_cast<int>(matrices_.size());
-        matrices_.push_back({A, StageMatrix(data_, jacobian_, g.size())});
+        matrices_.push_back({A, StageMatrix(data_, start_.jacobian(), g.size())});
       }
       largest = std::max(largest, g.size());
     }
     for (int i = g.first; i <= g.last; ++i) matrix_of_.push_back(found);
   }
-  if (rk_.error_filter != 0) filter_.emplace(data_, jacobian_);
   const Eigen::Index rows = StageEquations::count(data_);
-  own_values_.assign(static_cast<std::size_t>(largest), values_);
-  same_.assign(own_values_.size(), &values_);
-  for (const MotionJacobian::Values& v : own_values_) own_.push_back(&v);
+  own_values_.assign(static_cast<std::size_t>(largest), start_.values());
   for (Points* points : {&past_, &present_}) {
     points->places.assign(static_cast<std::size_t>(rk_.stages), {0, Eigen::VectorXd::Zero(rows)});
   }
@@ -64,9 +59,9 @@ void ImplicitStages::add_to(SimulationStatistics& s) const {
   s.rhs_evaluations += evaluations_;
   s.newton_iterations += iterations_;
   s.linear_solves += iterations_ + filters_;
-  s.linearised_states += equations_.places();
+  s.linearised_states += start_.places();
   s.jacobians += jacobians_ + own_jacobians_;
-  if (filter_) s.factorisations += filter_->factorisations();
+  s.factorisations += start_.factorisations();
   for (const Matrix& m : matrices_) s.factorisations += m.matrix.factorisations();
 }
 
@@ -102,8 +97,7 @@ void ImplicitStages::accept(const Step& step) {
 }
 
 void ImplicitStages::evaluate_jacobian(const Step& step) {
-  equations_.place_at(step.t, step.y0, step.angles0, a_start_, lambda_start_);
-  jacobian_.evaluate(equations_, values_);
+  start_.linearise(step.t, step.y0, step.angles0, a_start_, lambda_start_);
   ++jacobians_;
   age_ = 0;
   renew_ = false;
@@ -113,7 +107,7 @@ bool ImplicitStages::ready(const Step& step, Matrix& m) {
   if (renew_) evaluate_jacobian(step);
   if (m.jacobian == jacobians_ && m.h == step.h) return true;
   m.jacobian = -1;
-  if (!m.matrix.factor(step.h, m.A, std::span(same_).first(static_cast<std::size_t>(m.A.rows())))) return false;
+  if (!m.matrix.factor(step.h, m.A, std::span(&start_.values(), 1))) return false;
   m.h = step.h;
   m.jacobian = jacobians_;
   return true;
@@ -167,14 +161,13 @@ bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Mat
   for (int i = 0; i < g.size(); ++i) {
     const int stage = g.first + i;
     y_ = step.Y.col(stage);
-    equations_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, step.K.col(stage).tail(layout_.positions()),
-                        step.lambda.col(stage));
-    MotionJacobian::Values& own = own_values_[static_cast<std::size_t>(i)];
-    jacobian_.evaluate(equations_, own);
+    start_.equations().place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0,
+                                step.K.col(stage).tail(layout_.positions()), step.lambda.col(stage));
+    start_.jacobian().evaluate(start_.equations(), own_values_[static_cast<std::size_t>(i)]);
     ++own_jacobians_;
   }
   m.jacobian = -1;  // not that of the start
-  return m.matrix.factor(step.h, m.A, std::span(own_).first(static_cast<std::size_t>(g.size())));
+  return m.matrix.factor(step.h, m.A, std::span(own_values_).first(static_cast<std::size_t>(g.size())));
 }
 
 // Residuals of the group's stages at x_ into r_.
@@ -184,8 +177,9 @@ bool ImplicitStages::evaluate_residuals(Step& step, const StageGroup& g) {
   for (int i = 0; i < g.size(); ++i) {
     const int stage = g.first + i;
     y_ = step.Y.col(stage);
-    equations_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, x_.col(i).head(n), x_.col(i).tail(data_.m));
-    equations_.residual(r_.col(0).segment(i * rows, rows));
+    start_.equations().place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, x_.col(i).head(n),
+                                x_.col(i).tail(data_.m));
+    start_.equations().residual(r_.col(0).segment(i * rows, rows));
     ++evaluations_;
   }
   return r_.topRows(g.size() * rows).allFinite();
@@ -290,14 +284,8 @@ bool ImplicitStages::solve(Step& step, const StageGroup& g, Goal goal) {
 
 bool ImplicitStages::filter(const Step& step, Eigen::VectorXd& error) {
   if (renew_) evaluate_jacobian(step);
-  const double gamma = step.h * rk_.error_filter;
-  if (filter_h_ != step.h || filter_jacobian_ != jacobians_) {
-    filter_jacobian_ = -1;
-    if (!filter_->factor(gamma, values_)) return false;
-    filter_h_ = step.h;
-    filter_jacobian_ = jacobians_;
-  }
-  filter_->solve(error);
+  if (!start_.factor(step.h * rk_.error_filter)) return false;
+  start_.solve(error);
   ++filters_;
   return true;
 }

@@ -11,7 +11,6 @@
 // mean something.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "core/body/state_layout.hpp"
@@ -28,8 +27,6 @@ class ImplicitStages {
  public:
   ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
                  SpatialDynamics& dynamics);
-  ImplicitStages(const ImplicitStages&) = delete;  // its matrices refer to its Jacobian
-  ImplicitStages& operator=(const ImplicitStages&) = delete;
 
   // The motion at the start of the run: a, lambda at step.y0.
   void begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda);
@@ -85,16 +82,10 @@ class ImplicitStages {
   const Method& rk_;
   IntegratorSettings settings_;
   ComponentTolerances tolerances_;
-  StageEquations equations_;
-  MotionJacobian jacobian_;
-  MotionJacobian::Values values_;
+  ShiftedSystem start_;                             // linearised at a step's start; the filter solves with it
   std::vector<MotionJacobian::Values> own_values_;  // per stage of a group
-  std::vector<const MotionJacobian::Values*> same_, own_;
   std::vector<Matrix> matrices_;
   std::vector<int> matrix_of_;  // per group, in order
-  std::optional<ShiftedSystem> filter_;
-  double filter_h_ = 0;
-  long filter_jacobian_ = -1;
 
   Eigen::VectorXd a_start_, lambda_start_;
   Points past_, present_;  // of the last accepted step; of the attempt in hand

@@ -7,7 +7,6 @@ namespace mbsopt {
 LinearisedStages::LinearisedStages(const MechanismData& data, const Method& method, SpatialDynamics& dynamics)
     : rk_(method), equations_(dynamics), jacobian_(data) {
   values_.assign(static_cast<std::size_t>(largest_implicit_group(method)), jacobian_.values());
-  for (const MotionJacobian::Values& v : values_) pointers_.push_back(&v);
   std::vector<int> sizes;
   for (const StageGroup& g : method.stage_groups()) {
     if (is_implicit(method, g)) sizes.push_back(g.size());
@@ -43,7 +42,7 @@ bool LinearisedStages::factor(double h, const StageGroup& g) {
   for (int i = 0; i < g.size(); ++i) {
     for (int j = 0; j < g.size(); ++j) A(i, j) = rk_.a(g.first + i, g.first + j);
   }
-  return matrices_[of(g)].factor(h, A, std::span(pointers_).first(static_cast<std::size_t>(g.size())),
+  return matrices_[of(g)].factor(h, A, std::span(values_).first(static_cast<std::size_t>(g.size())),
                                  StageMatrix::Trial::by_solutions);
 }
 

@@ -34,9 +34,8 @@ class LinearisedStages {
   Eigen::VectorXd y_;
   MotionJacobian jacobian_;
   std::vector<MotionJacobian::Values> values_;  // per stage of the group in hand
-  std::vector<const MotionJacobian::Values*> pointers_;
-  std::vector<StageMatrix> matrices_;  // per size of a group
-  std::vector<Eigen::MatrixXd> A_;     // the same: of the group in hand
+  std::vector<StageMatrix> matrices_;           // per size of a group
+  std::vector<Eigen::MatrixXd> A_;              // the same: of the group in hand
 };
 
 }  // namespace mbsopt

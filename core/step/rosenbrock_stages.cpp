@@ -3,26 +3,18 @@
 namespace mbsopt {
 
 RosenbrockStages::RosenbrockStages(const Mechanism& mechanism, const Method& method, Dynamics& dynamics)
-    : rk_(method),
-      dynamics_(dynamics),
-      equations_(dynamics.in_space()),
-      jacobian_(mechanism.data()),
-      values_(jacobian_.values()),
-      matrix_(mechanism.data(), jacobian_) {
+    : rk_(method), dynamics_(dynamics), matrix_(mechanism.data(), dynamics.in_space()) {
   for (Eigen::VectorXd* x : {&f_, &f_t_, &y_, &ydot_, &s_, &x_}) x->setZero(mechanism.states());
 }
 
 bool RosenbrockStages::begin(const Step& step) {
   ++evaluations_, ++jacobians_;
   if (!dynamics_.evaluate(step.t, step.y0, step.angles0, f_)) return false;
-  equations_.place_at(step.t, step.y0, step.angles0, f_.tail(f_.size() / 2), dynamics_.lambda());
-  jacobian_.evaluate(equations_, values_);
+  matrix_.linearise(step.t, step.y0, step.angles0, f_.tail(f_.size() / 2), dynamics_.lambda());
   return true;
 }
 
-bool RosenbrockStages::factor(const Step& step) {
-  return begin(step) && matrix_.factor(step.h * rk_.gamma_of(0, 0), values_);
-}
+bool RosenbrockStages::factor(const Step& step) { return begin(step) && matrix_.factor(step.h * rk_.gamma_of(0, 0)); }
 
 bool RosenbrockStages::solve(Step& step) {
   const double h = step.h, g = rk_.gamma_of(0, 0);
@@ -33,7 +25,7 @@ bool RosenbrockStages::solve(Step& step) {
     if (!dynamics_.evaluate(step.t + k * kSpacing * h, step.y0, step.angles0, ydot_)) return false;
     f_t_ += kWeights[static_cast<std::size_t>(k)] / kSpacing * ydot_;
   }
-  if (!matrix_.factor(h * g, values_)) return false;
+  if (!matrix_.factor(h * g)) return false;
   for (int i = 0; i < rk_.stages; ++i) {
     sum_stages(
         step.K, i, [&](int j) { return h * rk_.a(i, j); }, step.y0, y_);

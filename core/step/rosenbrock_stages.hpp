@@ -29,8 +29,6 @@ namespace mbsopt {
 class RosenbrockStages {
  public:
   RosenbrockStages(const Mechanism& mechanism, const Method& method, Dynamics& dynamics);
-  RosenbrockStages(const RosenbrockStages&) = delete;  // its matrix refers to its Jacobian
-  RosenbrockStages& operator=(const RosenbrockStages&) = delete;
 
   // f and f_y at the start of the step, for all attempts from there. False: not finite.
   bool begin(const Step& step);
@@ -70,9 +68,6 @@ class RosenbrockStages {
 
   const Method& rk_;
   Dynamics& dynamics_;
-  StageEquations equations_;
-  MotionJacobian jacobian_;
-  MotionJacobian::Values values_;
   ShiftedSystem matrix_;
   Eigen::VectorXd f_, f_t_, y_, ydot_, s_, x_;  // f_t_: times h
   long evaluations_ = 0, jacobians_ = 0, solves_ = 0, linearised_ = 0;

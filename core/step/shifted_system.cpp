@@ -4,16 +4,28 @@
 
 namespace mbsopt {
 
-ShiftedSystem::ShiftedSystem(const MechanismData& data, const MotionJacobian& jacobian)
-    : jacobian_(&jacobian), matrix_(data, jacobian, 1), half_(StateLayout{data.n}.positions()) {
+ShiftedSystem::ShiftedSystem(const MechanismData& data, SpatialDynamics& dynamics)
+    : equations_(dynamics),
+      jacobian_(data),
+      values_(jacobian_.values()),
+      matrix_(data, jacobian_, 1),
+      half_(StateLayout{data.n}.positions()) {
   r_.setZero(matrix_.size(), kLanes);
   y_.setZero(2 * half_, kLanes);
 }
 
-bool ShiftedSystem::factor(double gamma, const MotionJacobian::Values& values) {
-  values_ = &values;
+void ShiftedSystem::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                              const Eigen::Ref<const Eigen::VectorXd>& a,
+                              const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+  equations_.place_at(t, y, angles, a, lambda);
+  jacobian_.evaluate(equations_, values_);
+  factored_ = false;
+}
+
+bool ShiftedSystem::factor(double gamma) {
+  if (factored_ && gamma == gamma_) return true;
   gamma_ = gamma;
-  return matrix_.factor(gamma, one_, std::span(&values_, 1));
+  return factored_ = matrix_.factor(gamma, one_, std::span(&values_, 1));
 }
 
 void ShiftedSystem::solve(Eigen::Ref<Eigen::MatrixXd> x, int refinements) {
@@ -22,17 +34,17 @@ void ShiftedSystem::solve(Eigen::Ref<Eigen::MatrixXd> x, int refinements) {
   x_q += gamma_ * x_v;
   r.setZero();
   std::size_t k = 0;
-  for (const auto& p : jacobian_->pairs()) {
+  for (const auto& p : jacobian_.pairs()) {
     auto out = r.middleRows<7>(columns_of(p.row));
-    out.noalias() -= values_->q[k] * x_q.middleRows<7>(columns_of(p.body));
-    out.noalias() -= values_->v[k] * x_v.middleRows<7>(columns_of(p.body));
+    out.noalias() -= values_.q[k] * x_q.middleRows<7>(columns_of(p.body));
+    out.noalias() -= values_.v[k] * x_v.middleRows<7>(columns_of(p.body));
     ++k;
   }
   k = 0;
-  for (const auto& row : jacobian_->rows()) {
+  for (const auto& row : jacobian_.rows()) {
     auto out = r.row(half_ + row.row);
-    out.noalias() -= values_->row_q[k] * x_q.middleRows<7>(columns_of(row.body));
-    out.noalias() -= values_->row_v[k] * x_v.middleRows<7>(columns_of(row.body));
+    out.noalias() -= values_.row_q[k] * x_q.middleRows<7>(columns_of(row.body));
+    out.noalias() -= values_.row_v[k] * x_v.middleRows<7>(columns_of(row.body));
     ++k;
   }
   matrix_.solve(r, refinements);
@@ -50,17 +62,17 @@ void ShiftedSystem::solve_transposed(Eigen::Ref<Eigen::MatrixXd> x, int refineme
   matrix_.solve_transposed(r, refinements);
   y.setZero();
   std::size_t k = 0;
-  for (const auto& p : jacobian_->pairs()) {
+  for (const auto& p : jacobian_.pairs()) {
     const auto beta = r.middleRows<7>(columns_of(p.row));
-    y.middleRows<7>(columns_of(p.body)).noalias() -= values_->q[k].transpose() * beta;
-    y.middleRows<7>(half_ + columns_of(p.body)).noalias() -= values_->v[k].transpose() * beta;
+    y.middleRows<7>(columns_of(p.body)).noalias() -= values_.q[k].transpose() * beta;
+    y.middleRows<7>(half_ + columns_of(p.body)).noalias() -= values_.v[k].transpose() * beta;
     ++k;
   }
   k = 0;
-  for (const auto& row : jacobian_->rows()) {
+  for (const auto& row : jacobian_.rows()) {
     const auto beta = r.row(half_ + row.row);
-    y.middleRows<7>(columns_of(row.body)).noalias() -= values_->row_q[k].transpose() * beta;
-    y.middleRows<7>(half_ + columns_of(row.body)).noalias() -= values_->row_v[k].transpose() * beta;
+    y.middleRows<7>(columns_of(row.body)).noalias() -= values_.row_q[k].transpose() * beta;
+    y.middleRows<7>(half_ + columns_of(row.body)).noalias() -= values_.row_v[k].transpose() * beta;
     ++k;
   }
   x_q += y.topRows(half_);

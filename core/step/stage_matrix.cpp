@@ -17,33 +17,6 @@ constexpr double kNegligible = 2e-14;
 constexpr double kWrong = 1e-4;  // relative residual of forces from which a factor is not used
 constexpr int kSparseRun = 20;   // factorisations by the sparse LU after one that was not
 
-using Entries = std::vector<SparseLu::Entry>;
-
-void add_block(int row, int column, int rows, int columns, Entries& entries) {
-  for (int c = 0; c < columns; ++c) {
-    for (int r = 0; r < rows; ++r) entries.push_back({row + r, column + c});
-  }
-}
-
-// The places of all blocks, in the order in which factor_sparse() fills them.
-Entries entries_of(const MotionJacobian& jacobian, int stages) {
-  const int n = columns_of(jacobian.bodies()), size = n + jacobian.constraints();
-  Entries entries;
-  for (int i = 0; i < stages; ++i) {
-    for (int j = 0; j < stages; ++j) {
-      for (const auto& p : jacobian.pairs())
-        add_block(i * size + columns_of(p.row), j * size + columns_of(p.body), 7, 7, entries);
-      for (const auto& r : jacobian.rows())
-        add_block(i * size + n + r.row, j * size + columns_of(r.body), 1, 7, entries);
-    }
-    for (int b = 0; b < jacobian.bodies(); ++b)
-      add_block(i * size + columns_of(b), i * size + columns_of(b), 7, 7, entries);
-    for (const auto& r : jacobian.rows()) add_block(i * size + columns_of(r.body), i * size + n + r.row, 6, 1, entries);
-    for (int r = 0; r < jacobian.constraints(); ++r) add_block(i * size + n + r, i * size + n + r, 1, 1, entries);
-  }
-  return entries;
-}
-
 }  // namespace
 
 StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobian, int stages)
@@ -114,11 +87,11 @@ void StageMatrix::set_scales(const MechanismData& data) {
   multiplier_scale_ = (data.row_alpha * J).cwiseSqrt().unaryExpr(power_of_two);
 }
 
-bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values,
+bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values> values,
                          Trial trial) {
   P_ = h * A;
   P2_.noalias() = P_.lazyProduct(P_);
-  std::copy(values.begin(), values.end(), values_.begin());
+  for (std::size_t i = 0; i < values_.size(); ++i) values_[i] = &values[values.size() == 1 ? 0 : i];
   W_ = (values_[0]->compliance + epsilon_.array()).inverse();
   ++factorisations_;
   use_sparse_ = false;
@@ -195,36 +168,55 @@ void StageMatrix::add_joint(const Joint& joint, int i, const MotionJacobian::Val
 }
 
 bool StageMatrix::factor_sparse() {
-  if (!sparse_) sparse_.emplace(static_cast<int>(size()), entries_of(*jacobian_, stages_));
+  const int n = static_cast<int>(accelerations_), size = static_cast<int>(per_stage_);
+  // f(row, column, value) for all entries of N, scaled, always in the same order.
+  const auto for_each_entry = [&](auto&& f) {
+    const auto block = [&](int row, int column, const MotionJacobian::Block& x) {
+      const MotionJacobian::Block scaled = scale_.cwiseProduct(x);
+      for (int c = 0; c < 7; ++c) {
+        for (int r = 0; r < 7; ++r) f(row + r, column + c, scaled(r, c));
+      }
+    };
+    for (int i = 0; i < stages_; ++i) {
+      const MotionJacobian::Values& of = *values_[at(i)];
+      const int stage = i * size;
+      for (int j = 0; j < stages_; ++j) {
+        const double p = P_(i, j), pp = P2_(i, j);
+        for (std::size_t b = 0; b < of.q.size(); ++b) {
+          const auto& place = jacobian_->pairs()[b];
+          block(stage + columns_of(place.row), j * size + columns_of(place.body), p * of.v[b] + pp * of.q[b]);
+        }
+        for (std::size_t r = 0; r < of.row_q.size(); ++r) {
+          const auto& place = jacobian_->rows()[r];
+          const double scale = multiplier_scale_(place.row);
+          for (int e = 0; e < 7; ++e) {
+            f(stage + n + place.row, j * size + columns_of(place.body) + e,
+              scale * column_scale_(e) * (p * of.row_v[r](e) + pp * of.row_q[r](e) + (i == j ? of.J_Z[r](e) : 0.0)));
+          }
+        }
+      }
+      for (int b = 0; b < jacobian_->bodies(); ++b) block(stage + columns_of(b), stage + columns_of(b), of.mass[at(b)]);
+      for (std::size_t r = 0; r < of.J.size(); ++r) {
+        const auto& place = jacobian_->rows()[r];
+        const double scale = multiplier_scale_(place.row);
+        for (int e = 0; e < 6; ++e) {
+          f(stage + columns_of(place.body) + e, stage + n + place.row, scale * row_scale_(e) * of.J[r](e));
+        }
+      }
+      for (int r = 0; r < jacobian_->constraints(); ++r) {
+        f(stage + n + r, stage + n + r, -multiplier_scale_(r) * multiplier_scale_(r) / W_(r));
+      }
+    }
+  };
+  if (!sparse_) {
+    std::vector<SparseLu::Entry> places;
+    for_each_entry([&](int row, int column, double) { places.push_back({row, column}); });
+    sparse_.emplace(size * stages_, places);
+  }
   std::vector<double>& x = sparse_->values();
   std::fill(x.begin(), x.end(), 0.0);
   std::size_t k = 0;
-  auto add = [&](double value) { x[sparse_->slot(k++)] += value; };
-  for (int i = 0; i < stages_; ++i) {
-    const MotionJacobian::Values& of = *values_[at(i)];
-    for (int j = 0; j < stages_; ++j) {
-      const double p = P_(i, j), pp = P2_(i, j);
-      for (std::size_t b = 0; b < of.q.size(); ++b) {
-        const MotionJacobian::Block K = scale_.cwiseProduct(p * of.v[b] + pp * of.q[b]);
-        for (const double e : K.reshaped()) add(e);
-      }
-      for (std::size_t r = 0; r < of.row_q.size(); ++r) {
-        const double scale = multiplier_scale_(jacobian_->rows()[r].row);
-        for (Eigen::Index e = 0; e < 7; ++e) {
-          add(scale * column_scale_(e) * (p * of.row_v[r](e) + pp * of.row_q[r](e) + (i == j ? of.J_Z[r](e) : 0.0)));
-        }
-      }
-    }
-    for (const MotionJacobian::Block& mass : of.mass) {
-      const MotionJacobian::Block M = scale_.cwiseProduct(mass);
-      for (const double e : M.reshaped()) add(e);
-    }
-    for (std::size_t r = 0; r < of.J.size(); ++r) {
-      const double scale = multiplier_scale_(jacobian_->rows()[r].row);
-      for (Eigen::Index e = 0; e < 6; ++e) add(scale * row_scale_(e) * of.J[r](e));
-    }
-    for (Eigen::Index r = 0; r < W_.size(); ++r) add(-multiplier_scale_(r) * multiplier_scale_(r) / W_(r));
-  }
+  for_each_entry([&](int, int, double value) { x[sparse_->slot(k++)] += value; });
   return sparse_->factor();
 }
 
@@ -385,22 +377,24 @@ void StageMatrix::subtract_times(const Eigen::Ref<const Eigen::VectorXd>& x, Eig
     const Eigen::Index stage = i * per_stage_, combined = i * accelerations_;
     for (std::size_t k = 0; k < jacobian_->pairs().size(); ++k) {
       const auto& p = jacobian_->pairs()[k];
+      auto v = v_.segment<7>(combined + columns_of(p.body)), q = q_.segment<7>(combined + columns_of(p.body));
       if (Transposed) {
         const Vec<7> beta = x.segment<7>(stage + columns_of(p.row));
-        v_.segment<7>(combined + columns_of(p.body)).noalias() += of.v[k].transpose() * beta;
-        q_.segment<7>(combined + columns_of(p.body)).noalias() += of.q[k].transpose() * beta;
+        v.noalias() += of.v[k].transpose() * beta;
+        q.noalias() += of.q[k].transpose() * beta;
       } else {
         auto to = y.segment<7>(stage + columns_of(p.row));
-        to.noalias() -= of.v[k] * v_.segment<7>(combined + columns_of(p.body));
-        to.noalias() -= of.q[k] * q_.segment<7>(combined + columns_of(p.body));
+        to.noalias() -= of.v[k] * v;
+        to.noalias() -= of.q[k] * q;
       }
     }
     for (int b = 0; b < jacobian_->bodies(); ++b) {
+      auto to = y.segment<7>(stage + columns_of(b));
+      const auto a = x.segment<7>(stage + columns_of(b));
       if (Transposed) {
-        y.segment<7>(stage + columns_of(b)).noalias() -=
-            of.mass[at(b)].transpose() * x.segment<7>(stage + columns_of(b));
+        to.noalias() -= of.mass[at(b)].transpose() * a;
       } else {
-        y.segment<7>(stage + columns_of(b)).noalias() -= of.mass[at(b)] * x.segment<7>(stage + columns_of(b));
+        to.noalias() -= of.mass[at(b)] * a;
       }
     }
     y.segment(stage + accelerations_, W_.size()) += of.compliance * x.segment(stage + accelerations_, W_.size());
@@ -436,58 +430,49 @@ void StageMatrix::spread(double sign, Eigen::Ref<Eigen::VectorXd> y) {
   }
 }
 
-void StageMatrix::add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
-  combine(x);
+// f(values, k, row, body, combined) for each row of Phi and body that it ties, element k of the Jacobian's rows, in
+// each stage: the places of its multiplier, of the body's accelerations, and of these in v_ and q_.
+template <class Function>
+void StageMatrix::for_each_row(Function&& f) const {
   for (int i = 0; i < stages_; ++i) {
-    const MotionJacobian::Values& of = *values_[at(i)];
-    const Eigen::Index stage = i * per_stage_, combined = i * accelerations_;
     for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
       const auto& r = jacobian_->rows()[k];
-      y(stage + accelerations_ + r.row) += sign * (of.row_v[k].dot(v_.segment<7>(combined + columns_of(r.body))) +
-                                                   of.row_q[k].dot(q_.segment<7>(combined + columns_of(r.body))) +
-                                                   of.J_Z[k].dot(x.segment<7>(stage + columns_of(r.body))));
+      f(*values_[at(i)], k, i * per_stage_ + accelerations_ + r.row, i * per_stage_ + columns_of(r.body),
+        i * accelerations_ + columns_of(r.body));
     }
   }
+}
+
+void StageMatrix::add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
+  combine(x);
+  for_each_row([&](const auto& of, auto k, auto row, auto body, auto combined) {
+    y(row) += sign * (of.row_v[k].dot(v_.segment<7>(combined)) + of.row_q[k].dot(q_.segment<7>(combined)) +
+                      of.J_Z[k].dot(x.segment<7>(body)));
+  });
 }
 
 void StageMatrix::add_G_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
                                    Eigen::Ref<Eigen::VectorXd> y) {
   v_.setZero(), q_.setZero();
-  for (int i = 0; i < stages_; ++i) {
-    const MotionJacobian::Values& of = *values_[at(i)];
-    const Eigen::Index stage = i * per_stage_, combined = i * accelerations_;
-    for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
-      const auto& r = jacobian_->rows()[k];
-      const double lambda = x(stage + accelerations_ + r.row);
-      v_.segment<7>(combined + columns_of(r.body)) += lambda * of.row_v[k].transpose();
-      q_.segment<7>(combined + columns_of(r.body)) += lambda * of.row_q[k].transpose();
-      y.segment<7>(stage + columns_of(r.body)) += (sign * lambda) * of.J_Z[k].transpose();
-    }
-  }
+  for_each_row([&](const auto& of, auto k, auto row, auto body, auto combined) {
+    const double lambda = x(row);
+    v_.segment<7>(combined) += lambda * of.row_v[k].transpose();
+    q_.segment<7>(combined) += lambda * of.row_q[k].transpose();
+    y.segment<7>(body) += (sign * lambda) * of.J_Z[k].transpose();
+  });
   spread(sign, y);
 }
 
 void StageMatrix::add_J(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
-  for (int i = 0; i < stages_; ++i) {
-    const MotionJacobian::Values& of = *values_[at(i)];
-    const Eigen::Index stage = i * per_stage_;
-    for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
-      const auto& r = jacobian_->rows()[k];
-      y(stage + accelerations_ + r.row) += sign * of.J[k].dot(x.segment<6>(stage + columns_of(r.body)));
-    }
-  }
+  for_each_row(
+      [&](const auto& of, auto k, auto row, auto body, auto) { y(row) += sign * of.J[k].dot(x.segment<6>(body)); });
 }
 
 void StageMatrix::add_J_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
                                    Eigen::Ref<Eigen::VectorXd> y) {
-  for (int i = 0; i < stages_; ++i) {
-    const MotionJacobian::Values& of = *values_[at(i)];
-    const Eigen::Index stage = i * per_stage_;
-    for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
-      const auto& r = jacobian_->rows()[k];
-      y.segment<6>(stage + columns_of(r.body)) += (sign * x(stage + accelerations_ + r.row)) * of.J[k].transpose();
-    }
-  }
+  for_each_row([&](const auto& of, auto k, auto row, auto body, auto) {
+    y.segment<6>(body) += (sign * x(row)) * of.J[k].transpose();
+  });
 }
 
 template void StageMatrix::refine<false>(Eigen::Ref<Eigen::MatrixXd>, int);

@@ -31,10 +31,10 @@ class StageMatrix {
   int stages() const { return stages_; }
   Eigen::Index size() const { return per_stage_ * stages_; }
 
-  // A: of these stages alone. values: of each stage; may be one and the same; kept by reference until the next factor.
+  // A: of these stages alone. values: of each stage, or one for all; kept by reference until the next factor.
   // Trial: a factor that only serves refined solutions is tried by them.
   enum class Trial { now, by_solutions };
-  bool factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values,
+  bool factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values> values,
               Trial trial = Trial::now);
   static constexpr int kExact = 4;  // refinements at most for derivatives; Newton's method needs none
   // Solves in place, at most kLanes columns.
@@ -73,6 +73,8 @@ class StageMatrix {
   void subtract_times(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
   void combine(const Eigen::Ref<const Eigen::VectorXd>& x);
   void spread(double sign, Eigen::Ref<Eigen::VectorXd> y);
+  template <class Function>
+  void for_each_row(Function&& f) const;
   // Rows of Phi of y += sign G x, and the same of J;  accelerations of y += sign J' and G' times the multipliers of x.
   void add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
   void add_J(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);

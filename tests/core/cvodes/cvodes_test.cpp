@@ -280,18 +280,19 @@ TEST_CASE("the matrix of CVODES' Newton iteration solves I - gamma f_y, and its 
     const VectorXd e = VectorXd::Unit(n, k) * 1e-4;
     f_y.col(k) = (8 * (f(y + e) - f(y - e)) - (f(y + 2 * e) - f(y - 2 * e))) / 12e-4;
   }
-  cvodes::NewtonMatrix matrix(flow);
-  REQUIRE(matrix.linearise(0.3, cvodes::Flow::Numbers(y.data(), n)));
+  ShiftedSystem matrix(m.data(), flow.dynamics());
+  REQUIRE(flow.linearise(0.3, cvodes::Flow::Numbers(y.data(), n)));
+  matrix.linearise(0.3, y, flow.angles_at(0.3), flow.ydot().tail(n / 2), flow.dynamics().lambda());
   const double gamma = GENERATE(0.02, -0.3);
   REQUIRE(matrix.factor(gamma));
   const MatrixXd A = MatrixXd::Identity(n, n) - gamma * f_y;
   VectorXd b(n);
   for (Eigen::Index k = 0; k < n; ++k) b(k) = std::sin(static_cast<double>(k) + 1);
   VectorXd x = b;
-  matrix.solve(x);
+  matrix.solve(x, 1);
   CHECK((A * x - b).cwiseAbs().maxCoeff() < 1e-7 * A.cwiseAbs().maxCoeff() * x.cwiseAbs().maxCoeff());
   x = b;
-  matrix.solve_transposed(x);
+  matrix.solve_transposed(x, 1);
   CHECK((A.transpose() * x - b).cwiseAbs().maxCoeff() < 1e-7 * A.cwiseAbs().maxCoeff() * x.cwiseAbs().maxCoeff());
 }
 

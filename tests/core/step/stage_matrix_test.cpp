@@ -15,13 +15,12 @@ using Eigen::VectorXd;
 
 namespace {
 
-MatrixXd dense(const MotionJacobian& jacobian, const MatrixXd& P,
-               const std::vector<const MotionJacobian::Values*>& values) {
+MatrixXd dense(const MotionJacobian& jacobian, const MatrixXd& P, const std::vector<MotionJacobian::Values>& values) {
   const Index s = P.rows(), n = 7 * jacobian.bodies(), per = n + jacobian.constraints();
   const MatrixXd P2 = P * P;
   MatrixXd N = MatrixXd::Zero(s * per, s * per);
   for (Index i = 0; i < s; ++i) {
-    const MotionJacobian::Values& x = *values[static_cast<std::size_t>(i)];
+    const MotionJacobian::Values& x = values[static_cast<std::size_t>(i)];
     for (Index j = 0; j < s; ++j) {
       auto block = N.block(i * per, j * per, per, per);
       for (std::size_t k = 0; k < x.q.size(); ++k) {
@@ -66,11 +65,6 @@ struct Moving {
       y += 0.01 * ydot;
     }
   }
-  std::vector<const MotionJacobian::Values*> pointers() const {
-    std::vector<const MotionJacobian::Values*> all;
-    for (const auto& v : values) all.push_back(&v);
-    return all;
-  }
 };
 
 void check_solves(StageMatrix& matrix, const MatrixXd& N, double tolerance) {
@@ -90,9 +84,9 @@ TEST_CASE("coupled stages are solved by blocks, and transposed", "[stage_matrix]
   const Moving moving(every_force_four_bar(), stages);
   const MatrixXd P = 0.01 * (MatrixXd::Random(stages, stages) + 2 * MatrixXd::Identity(stages, stages));
   StageMatrix matrix(moving.mechanism.data(), moving.jacobian, stages);
-  REQUIRE(matrix.factor(1, P, moving.pointers()));
+  REQUIRE(matrix.factor(1, P, moving.values));
   CHECK(matrix.pivoted() == 0);
-  check_solves(matrix, dense(moving.jacobian, P, moving.pointers()), 1e-14);
+  check_solves(matrix, dense(moving.jacobian, P, moving.values), 1e-14);
 }
 
 TEST_CASE("more stages than blocks are made for go to the sparse LU", "[stage_matrix]") {
@@ -100,9 +94,9 @@ TEST_CASE("more stages than blocks are made for go to the sparse LU", "[stage_ma
   const Moving moving(loaded_four_bar(), kStages);
   const MatrixXd P = 0.01 * (MatrixXd::Random(kStages, kStages) + 2 * MatrixXd::Identity(kStages, kStages));
   StageMatrix matrix(moving.mechanism.data(), moving.jacobian, kStages);
-  REQUIRE(matrix.factor(1, P, moving.pointers()));
+  REQUIRE(matrix.factor(1, P, moving.values));
   CHECK(matrix.pivoted() == 1);
-  check_solves(matrix, dense(moving.jacobian, P, moving.pointers()), 1e-14);
+  check_solves(matrix, dense(moving.jacobian, P, moving.values), 1e-14);
 }
 
 TEST_CASE("where blocks give a wrong answer, the sparse LU does not", "[stage_matrix]") {
@@ -124,9 +118,9 @@ TEST_CASE("where blocks give a wrong answer, the sparse LU does not", "[stage_ma
   x.compliance = 1;
   const MatrixXd P = MatrixXd::Identity(1, 1);
   StageMatrix matrix(moving.mechanism.data(), moving.jacobian, 1);
-  REQUIRE(matrix.factor(1, P, moving.pointers()));
+  REQUIRE(matrix.factor(1, P, moving.values));
   CHECK(matrix.pivoted() == 1);
-  check_solves(matrix, dense(moving.jacobian, P, moving.pointers()), 1e-14);
+  check_solves(matrix, dense(moving.jacobian, P, moving.values), 1e-14);
 }
 
 // The units of lengths, masses and times change no digit of a factor.
@@ -153,7 +147,7 @@ TEST_CASE("a mechanism of micrometres is solved as well as one of metres", "[sta
   P << 0.2, -0.07, 0.02, 0.4, 0.3, -0.04, 0.38, 0.5, 0.11;  // about Radau IIA's
   P *= 1e-2;
   StageMatrix matrix(moving.mechanism.data(), moving.jacobian, 3);
-  REQUIRE(matrix.factor(1, P, moving.pointers()));
+  REQUIRE(matrix.factor(1, P, moving.values));
   VectorXd b = VectorXd::Zero(matrix.size());
   for (Index i = 0; i < 3; ++i) b.segment<3>(i * matrix.size() / 3 + 3) = inertia * Vector3d(1, 2, -1);
   MatrixXd once = b, exact = b;
