@@ -16,7 +16,7 @@
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/scene_path.hpp"
 #include "core/start/model_warnings.hpp"
-#include "core/watch/start_failure.hpp"
+#include "core/step/step_failure.hpp"
 
 namespace mbsopt::inline app {
 namespace {

@@ -17,7 +17,6 @@
 #include "core/step/step_failure.hpp"
 #include "core/watch/jump_watch.hpp"
 #include "core/watch/run_guard.hpp"
-#include "core/watch/start_failure.hpp"
 #include "core/watch/weak_joints.hpp"
 #include "core/watch/zero_length.hpp"
 
@@ -171,12 +170,7 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
     case CV_FIRST_SRHSFUNC_ERR:
     case CV_REPTD_SRHSFUNC_ERR:
     case CV_UNREC_SRHSFUNC_ERR:
-      stop(SimulationStatus::not_finite,
-           fmt::format(
-               "{} cannot be computed beyond t = {:.6g} s, however small the step. Look for a law or force that is "
-               "not finite there (a root, logarithm or division outside its range), or for a body without "
-               "inertia in a direction that no joint holds",
-               of_what, t));
+      stop(SimulationStatus::not_finite, not_computable(of_what, t));
       return;
     case CV_TOO_MUCH_ACC:
       stop(SimulationStatus::step_too_small, too_few_digits(settings_.integrator, t));

@@ -53,8 +53,6 @@ std::size_t Checkpoints::limit() const {
   return budget_ > listed + least ? budget_ - listed : least;
 }
 
-std::size_t Checkpoints::room() const { return limit() > bytes_ ? limit() - bytes_ : 0; }
-
 void Checkpoints::count(std::size_t more) {
   bytes_ += more;
   peak_ = std::max(peak_, bytes_ + static_cast<std::size_t>(steps_) * kStepListed +
@@ -69,11 +67,6 @@ std::size_t Checkpoints::bytes_of(const Snapshot& s) const {
 void Checkpoints::add(Snapshot s) {
   count(bytes_of(s));
   snapshots_.push_back(std::move(s));
-}
-
-void Checkpoints::drop_newest() {
-  bytes_ -= bytes_of(snapshots_.back());
-  snapshots_.pop_back();
 }
 
 void Checkpoints::keep(const Step& step, std::span<const SampleEvent> events) {
@@ -126,7 +119,8 @@ bool Checkpoints::go_back(const Replay& replay, const StepBack& back) {
   for (long last = steps_; !snapshots_.empty();) {
     if (!reverse(snapshots_.back(), last)) return false;
     last = snapshots_.back().step;
-    drop_newest();
+    bytes_ -= bytes_of(snapshots_.back());
+    snapshots_.pop_back();
   }
   return true;
 }
@@ -141,7 +135,8 @@ bool Checkpoints::back_over_kept() {
 }
 
 bool Checkpoints::reverse(const Snapshot& from, long last) {
-  const std::size_t length = static_cast<std::size_t>(last - from.step), free = std::max(room(), step_bytes_);
+  const std::size_t length = static_cast<std::size_t>(last - from.step),
+                    free = std::max(limit(), bytes_ + step_bytes_) - bytes_;
   if (length * step_bytes_ <= free) return keep_and_go_back(from, from.step, last);
   const std::size_t block = std::max<std::size_t>(free / 2 / step_bytes_, 1);
   const std::size_t left = free - block * step_bytes_;

@@ -49,11 +49,9 @@ class Checkpoints {
 
  private:
   std::size_t limit() const;  // of what is kept beside the list of steps
-  std::size_t room() const;
   void count(std::size_t more);
   std::size_t bytes_of(const Snapshot& s) const;
   void add(Snapshot s);
-  void drop_newest();
   void thin_out();
   void turn_steps_into_snapshots();
   bool reverse(const Snapshot& from, long last);

@@ -11,7 +11,6 @@
 #include "core/run/timed_laws.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/start/model_warnings.hpp"
-#include "core/watch/start_failure.hpp"
 #include "core/watch/weak_joints.hpp"
 
 namespace mbsopt {

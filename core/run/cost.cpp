@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <type_traits>
 
 #include "core/force/named_throw.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -9,46 +10,38 @@
 namespace mbsopt {
 namespace {
 
-class UserRunning final : public PointCost {
+// A cost of a user at fixed parameters, whose exceptions are named.
+template <class User>
+class UserCost : public PointCost {
  public:
-  UserRunning(std::shared_ptr<const RunningCost> cost, Eigen::VectorXd rho, std::string name)
+  UserCost(std::shared_ptr<const User> cost, Eigen::VectorXd rho, std::string name)
       : cost_(std::move(cost)), rho_(std::move(rho)), name_(std::move(name)) {}
   double value(const StatePoint& at) const override {
-    return named_throw(name_, [&] { return cost_->g(at.t, at.y, rho_); });
-  }
-  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
     return named_throw(name_, [&] {
-      cost_->add_g_y(at.t, at.y, rho_, scale, y_bar);
-      cost_->add_g_rho(at.t, at.y, rho_, scale, rho_bar);
-      return cost_->g(at.t, at.y, rho_);
+      if constexpr (std::is_same_v<User, RunningCost>)
+        return cost_->g(at.t, at.y, rho_);
+      else
+        return cost_->value(at.y, rho_);
     });
   }
-  const Eigen::VectorXd* rho() const override { return &rho_; }
-
- private:
-  std::shared_ptr<const RunningCost> cost_;
-  Eigen::VectorXd rho_;
-  std::string name_;
-};
-
-class UserTerminal final : public PointCost {
- public:
-  UserTerminal(std::shared_ptr<const TerminalCost> cost, Eigen::VectorXd rho, std::string name)
-      : cost_(std::move(cost)), rho_(std::move(rho)), name_(std::move(name)) {}
-  double value(const StatePoint& at) const override {
-    return named_throw(name_, [&] { return cost_->value(at.y, rho_); });
-  }
   double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
-    Eigen::VectorXd lambda = Eigen::VectorXd::Zero(at.y.size()), mu = Eigen::VectorXd::Zero(rho_.size());
-    named_throw(name_, [&] { cost_->adjoint_init(at.y, rho_, lambda, mu); });
-    y_bar += scale * lambda;
-    rho_bar += scale * mu;
+    named_throw(name_, [&] {
+      if constexpr (std::is_same_v<User, RunningCost>) {
+        cost_->add_g_y(at.t, at.y, rho_, scale, y_bar);
+        cost_->add_g_rho(at.t, at.y, rho_, scale, rho_bar);
+      } else {
+        Eigen::VectorXd lambda = Eigen::VectorXd::Zero(at.y.size()), mu = Eigen::VectorXd::Zero(rho_.size());
+        cost_->adjoint_init(at.y, rho_, lambda, mu);
+        y_bar += scale * lambda;
+        rho_bar += scale * mu;
+      }
+    });
     return value(at);
   }
   const Eigen::VectorXd* rho() const override { return &rho_; }
 
  private:
-  std::shared_ptr<const TerminalCost> cost_;
+  std::shared_ptr<const User> cost_;
   Eigen::VectorXd rho_;
   std::string name_;
 };
@@ -67,12 +60,12 @@ std::string not_finite_costs(std::span<const Cost> costs, const Eigen::VectorXd&
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Mechanism& mechanism,
                                             std::string name) {
   if (!running) throw std::invalid_argument("point_cost: there is no running cost (null)");
-  return std::make_shared<UserRunning>(std::move(running), mechanism.rho(), std::move(name));
+  return std::make_shared<UserCost<RunningCost>>(std::move(running), mechanism.rho(), std::move(name));
 }
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const TerminalCost> terminal, const Mechanism& mechanism,
                                             std::string name) {
   if (!terminal) throw std::invalid_argument("point_cost: there is no terminal cost (null)");
-  return std::make_shared<UserTerminal>(std::move(terminal), mechanism.rho(), std::move(name));
+  return std::make_shared<UserCost<TerminalCost>>(std::move(terminal), mechanism.rho(), std::move(name));
 }
 
 }  // namespace mbsopt

@@ -4,15 +4,49 @@
 
 #include <limits>
 
+#include "core/linear/dense.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 #include "core/step/step_control.hpp"
 
 namespace mbsopt {
+namespace {
+
+std::string bodies_without_inertia(const MechanismData& d) {
+  std::string names;
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& b = d.bodies[static_cast<std::size_t>(i)];
+    const double least = symmetric_eigenvalues(b.J)(0);
+    if (b.mass > 0 && least > 0) continue;
+    names += (names.empty() ? "'" : ", '") + d.body_names[static_cast<std::size_t>(i)] + "'";
+  }
+  return names;
+}
+
+}  // namespace
+
+std::string start_failure(const MechanismData& data, double t) {
+  const std::string bodies = bodies_without_inertia(data);
+  return fmt::format("the accelerations at the start, t = {:.6g} s, cannot be computed. ", t) +
+         (bodies.empty()
+              ? "A force or law is not finite there (a root, logarithm or division outside its range?): look "
+                "at the laws of forces and drives and at the sensors in them"
+              : "A body without mass or inertia in a direction that no joint holds has none: " + bodies +
+                    ". Give it some, or hold it");
+}
 
 std::string about_alpha(const FormulationSettings& f) {
   constexpr double kLarge = 1e13;
   const bool keeps_digits = f.type == FormulationType::penalty && f.linear_solver == LinearSolver::quasidefinite;
   if (keeps_digits || f.alpha < kLarge) return {};
   return fmt::format(". Or simulation.formulation.alpha is too large: {:.3g}, where 1e8 is usual", f.alpha);
+}
+
+std::string not_computable(const std::string& what, double t) {
+  return fmt::format(
+      "{} cannot be computed beyond t = {:.6g} s, however small the step. Look for a law or force that is not finite "
+      "there (a root, logarithm or division outside its range), or a body without inertia in a direction that no joint "
+      "holds",
+      what, t);
 }
 
 std::string too_long_run(double span, double longest) {
@@ -66,12 +100,7 @@ std::string step_failure(StepOutcome outcome, double t, double h, bool adaptive,
                        t, h);
     case StepOutcome::failed:
       return (adaptive
-                  ? fmt::format(
-                        "the accelerations cannot be computed beyond t = {:.6g} s, however small the step. Look for a "
-                        "law or "
-                        "force that is not finite there (a root, logarithm or division outside its range), or a "
-                        "body without inertia in a direction that no joint holds",
-                        t)
+                  ? not_computable("the accelerations", t)
                   : fmt::format("the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is "
                                 "too large "
                                 "for this motion: use a smaller step, or an adaptive integrator (no \"step\")",

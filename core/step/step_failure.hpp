@@ -9,13 +9,19 @@
 
 namespace mbsopt {
 
+struct MechanismData;
+
 // unsolved: Newton's method did not converge; failed: a number is not finite, a matrix is singular; off_constraints:
 // projection found no state that meets them.
 enum class StepOutcome { accepted, rejected, unsolved, failed, off_constraints };
 
+// Says why a run cannot begin without accelerations at its start.
+std::string start_failure(const MechanismData& data, double t);
 // Says why the step from t by h failed; adaptive: it was the last of smaller and smaller ones.
 std::string step_failure(StepOutcome outcome, double t, double h, bool adaptive,
                          const FormulationSettings& formulation);
+// what: "the accelerations", or derivatives of them.
+std::string not_computable(const std::string& what, double t);
 // A step of simulation.integrator.options.min_step is still too long.
 std::string below_min_step(StepOutcome outcome, double t, double min_step);
 // longest: of the steps so far.
