@@ -227,41 +227,43 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal go
   } else if (!ready(step, m)) {
     return false;
   }
-  const double tolerance =
-      std::max(settings_.options.newton_tolerance.value_or(std::min(1e-2, std::sqrt(settings_.rtol))),
-               10 * std::numeric_limits<double>::epsilon() / settings_.rtol);
   const long most = exact ? kMostExactIterations : settings_.options.newton_iterations.value_or(kMostNewtonIterations);
   double before = INFINITY;
   int own_left = kMostOwnJacobians;
-  for (long k = 0, since = 0; k < most; ++k, ++since) {
+  for (long k = 0; k < most; ++k) {
     if (!evaluate_residuals(step, g)) return false;
     m.matrix.solve(r_.topRows(g.size() * rows), 0);
     ++iterations_;
     const double now = add_change(step, g, m, exact);
     if (!std::isfinite(now)) return false;
-    bool converges = true;
-    if (since > 0) rate_ = before > 0 ? now / before : 0;
-    if (goal == Goal::polish && (since > 0 || !own) && rate_ <= 0.5 && rate_ / (1 - rate_) * now <= kPolished)
-      return true;
-    if (since > 0) {
-      if (exact) {
-        converges = rate_ <= 0.5;
-        if (!converges && now < kRounding) return true;
-      } else {
-        converges = rate_ < 1;
-        if (converges && rate_ / (1 - rate_) * now <= tolerance) return true;
-        if (converges) converges = std::pow(rate_, static_cast<double>(most - 1 - k)) / (1 - rate_) * now <= tolerance;
-      }
-    }
-    if (now <= (exact ? 1e-15 : 1e-10)) return true;
+    const Convergence convergence = judged(now, before, most - 1 - k, goal, own);
+    if (convergence == Convergence::reached) return true;
     before = now;
-    if (converges) continue;
+    if (convergence == Convergence::ahead) continue;
     if ((!own && !exact) || own_left-- == 0) return false;
     set_stages(step, g);
     if (!linearise_stages(step, g, m)) return false;
-    since = -1;
+    before = INFINITY;
   }
   return false;
+}
+
+ImplicitStages::Convergence ImplicitStages::judged(double now, double before, long left, Goal goal, bool own) {
+  const bool exact = goal != Goal::tolerance, has_rate = std::isfinite(before);
+  if (has_rate) rate_ = before > 0 ? now / before : 0;
+  if (now <= (exact ? 1e-15 : 1e-10)) return Convergence::reached;
+  const double ahead = rate_ / (1 - rate_) * now;  // what all further iterations change, if rate_ is below 1
+  if (goal == Goal::polish && (has_rate || !own) && rate_ <= 0.5 && ahead <= kPolished) return Convergence::reached;
+  if (!has_rate) return Convergence::ahead;
+  if (exact && rate_ <= 0.5) return Convergence::ahead;
+  if (exact) return now < kRounding ? Convergence::reached : Convergence::lost;
+  if (!(rate_ < 1)) return Convergence::lost;
+  const double tolerance =
+      std::max(settings_.options.newton_tolerance.value_or(std::min(1e-2, std::sqrt(settings_.rtol))),
+               10 * std::numeric_limits<double>::epsilon() / settings_.rtol);
+  if (ahead <= tolerance) return Convergence::reached;
+  const bool in_time = std::pow(rate_, static_cast<double>(left)) / (1 - rate_) * now <= tolerance;
+  return in_time ? Convergence::ahead : Convergence::lost;
 }
 
 bool ImplicitStages::solve(Step& step, const StageGroup& g, Goal goal) {
