@@ -27,6 +27,17 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
       mobility_(data.row_alpha.cwiseInverse()),
       epsilon_(kRelativeEpsilon * mobility_) {
   set_scales(data);
+  find_joints(jacobian);
+  if (BlockLu::takes(7 * stages)) make_blocks(data, jacobian);
+  values_.resize(at(stages));
+  P_.setZero(stages, stages), P2_.setZero(stages, stages);
+  W_.setZero(data.m);
+  right_.setZero(size(), kLanes), step_.setZero(size(), kLanes);
+  v_.setZero(stages * accelerations_), q_.setZero(v_.size());
+  probe_.setZero(size()), answer_.setZero(size());
+}
+
+void StageMatrix::find_joints(const MotionJacobian& jacobian) {
   const auto& rows = jacobian.rows();
   for (std::size_t k = 0; k < rows.size();) {
     std::vector<int> bodies;
@@ -39,37 +50,32 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
       joints_.push_back({rows[first].row, 1, first, bodies, {}});
     }
   }
-  if (BlockLu::takes(7 * stages)) {
-    std::vector<std::pair<int, int>> edges;
-    for (const auto& p : jacobian.pairs()) {
-      if (p.row != p.body) edges.push_back({p.row, p.body});
-    }
-    for (const Joint& joint : joints_) {
-      for (const int a : joint.bodies) {
-        for (const int b : joint.bodies) {
-          if (a != b) edges.push_back({a, b});
-        }
-      }
-    }
-    blocks_.emplace(7 * stages, data.n, edges);
-    for (const auto& p : jacobian.pairs()) pairs_.push_back(blocks_->handle(p.row, p.body));
-    for (int b = 0; b < data.n; ++b) diagonal_.push_back(blocks_->handle(b, b));
-    std::size_t most = 0;
-    for (Joint& joint : joints_) {
-      for (const int a : joint.bodies) {
-        for (const int b : joint.bodies) joint.blocks.push_back(blocks_->handle(a, b));
-      }
-      most = std::max(most, at(joint.rows) * joint.bodies.size());
-    }
-    G_.resize(most), JW_.resize(most);
-    by_body_.setZero(data.n * blocks_->stride());
+}
+
+void StageMatrix::make_blocks(const MechanismData& data, const MotionJacobian& jacobian) {
+  std::vector<std::pair<int, int>> edges;
+  for (const auto& p : jacobian.pairs()) {
+    if (p.row != p.body) edges.push_back({p.row, p.body});
   }
-  values_.resize(at(stages));
-  P_.setZero(stages, stages), P2_.setZero(stages, stages);
-  W_.setZero(data.m);
-  right_.setZero(size(), kLanes), step_.setZero(size(), kLanes);
-  v_.setZero(stages * accelerations_), q_.setZero(v_.size());
-  probe_.setZero(size()), answer_.setZero(size());
+  for (const Joint& joint : joints_) {
+    for (const int a : joint.bodies) {
+      for (const int b : joint.bodies) {
+        if (a != b) edges.push_back({a, b});
+      }
+    }
+  }
+  blocks_.emplace(7 * stages_, data.n, edges);
+  for (const auto& p : jacobian.pairs()) pairs_.push_back(blocks_->handle(p.row, p.body));
+  for (int b = 0; b < data.n; ++b) diagonal_.push_back(blocks_->handle(b, b));
+  std::size_t most = 0;
+  for (Joint& joint : joints_) {
+    for (const int a : joint.bodies) {
+      for (const int b : joint.bodies) joint.blocks.push_back(blocks_->handle(a, b));
+    }
+    most = std::max(most, at(joint.rows) * joint.bodies.size());
+  }
+  G_.resize(most), JW_.resize(most);
+  by_body_.setZero(data.n * blocks_->stride());
 }
 
 // Lengths are in units of L and forces in units of J/L, where the heaviest body has the inertia J = m L^2. Multipliers

@@ -51,6 +51,8 @@ class StageMatrix {
     std::vector<BlockLu::Handle> blocks;  // (row body, column body), columns fastest
   };
 
+  void find_joints(const MotionJacobian& jacobian);
+  void make_blocks(const MechanismData& data, const MotionJacobian& jacobian);
   void set_scales(const MechanismData& data);
   template <bool Columns>
   void scale(Eigen::Ref<Eigen::MatrixXd> b) const;
