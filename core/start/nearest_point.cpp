@@ -81,9 +81,6 @@ class NearestPointSearch {
   // equations do not come closer either.
   bool iterate() {
     constexpr double kNear = 0.05;    // Gauss-Newton steps below it, per unit of x, may be Newton's instead
-    constexpr double kConvex = 1e-3;  // least eigenvalue of Z'HZ at which they are
-    constexpr double kStrict = 1e-9;  // the same of a minimum: the nearest point moves at most 1e9 times as far
-    constexpr double kFlat = 1e-11;   // steps below it, relative to each unknown, may consist of rounding
     constexpr double kClose = 1e-8;   // of each unknown's size: the square of a step, the error left, is rounding
     constexpr int kPatience = 30;     // steps without a shorter one: it circles
     constexpr double kBeside = 1e-3;  // of the sizes
@@ -115,19 +112,7 @@ class NearestPointSearch {
         if (decomposes_) move(result_.x + along(kBeside * sizes));
         continue;
       }
-      if (decomposes_ && length < kNear * part * size()) {
-        result_.nu = at.multipliers_at(away);
-        result_.linearisation.set_hessian(hessian_at(equations_, result_));
-        const VectorXd& lambda = at.reduced_eigenvalues();
-        if (lambda.size() == 0 || lambda(0) > kConvex) step = at.solve(-result_.F, away);
-        const double relative = largest(step.cwiseQuotient(sizes + VectorXd(result_.x.cwiseAbs())));
-        if (satisfied() && (relative <= 2 * kEpsilon || (relative < kFlat && !(relative < 0.5 * last)))) {
-          const bool is_minimum = lambda.size() == 0 || lambda(0) > kStrict;
-          result_.status = is_minimum ? NearestPointStatus::found : NearestPointStatus::undetermined;
-          return true;
-        }
-        last = relative;
-      }
+      if (decomposes_ && length < kNear * part * size() && turn_to_newton(away, sizes, step, last)) return true;
       const Eigen::ArrayXd close = (kClose * sizes).cwiseMax(4 * kEpsilon * result_.x.cwiseAbs());
       move(result_.x + equations_.step_fraction(step) * step);
       if (decomposes_ || (step.array().abs() > close).any()) continue;
@@ -137,6 +122,26 @@ class NearestPointSearch {
       result_.determined = true;
       return true;
     }
+    return true;
+  }
+
+  // Replaces a Gauss-Newton step by Newton's where the problem is convex. Returns true at the nearest point: the step
+  // consists of rounding. `last` is the previous step, relative to each unknown.
+  bool turn_to_newton(const VectorXd& away, const VectorXd& sizes, VectorXd& step, double& last) {
+    constexpr double kConvex = 1e-3;  // least eigenvalue of Z'HZ at which steps are Newton's
+    constexpr double kStrict = 1e-9;  // the same of a minimum: the nearest point moves at most 1e9 times as far
+    constexpr double kFlat = 1e-11;   // steps below it, relative to each unknown, may consist of rounding
+    NearestPointLinearisation& at = result_.linearisation;
+    result_.nu = at.multipliers_at(away);
+    at.set_hessian(hessian_at(equations_, result_));
+    const VectorXd& lambda = at.reduced_eigenvalues();
+    if (lambda.size() == 0 || lambda(0) > kConvex) step = at.solve(-result_.F, away);
+    const double relative = largest(step.cwiseQuotient(sizes + VectorXd(result_.x.cwiseAbs())));
+    const bool is_rounding = relative <= 2 * kEpsilon || (relative < kFlat && !(relative < 0.5 * last));
+    last = relative;
+    if (!satisfied() || !is_rounding) return false;
+    const bool is_minimum = lambda.size() == 0 || lambda(0) > kStrict;
+    result_.status = is_minimum ? NearestPointStatus::found : NearestPointStatus::undetermined;
     return true;
   }
 
