@@ -173,12 +173,13 @@ class Chooser {
         stiff_why_.clear();  // it was right at a tighter tolerance, and stays
         break;
       }
+      const bool ran_out = max_steps < base_.integrator.max_steps && point.answer.statistics.steps >= max_steps / 2;
+      if (!point.answer.ok && ran_out) {
+        if (implicit_is_cheaper(point)) return {};
+        max_steps = base_.integrator.max_steps;  // long, not stiff
+        continue;
+      }
       if (!point.answer.ok) {
-        if (max_steps < base_.integrator.max_steps && point.answer.statistics.steps >= max_steps / 2) {
-          if (implicit_is_cheaper(point)) return {};
-          max_steps = base_.integrator.max_steps;  // long, not stiff
-          continue;
-        }
         if (best || rtol <= 1e-6) return failed(point.answer, std::move(best));
         rtol *= 1e-2;  // too loose to get through
         continue;
@@ -197,24 +198,30 @@ class Chooser {
         best.reset(), last.reset();
         continue;
       }
-      // The order in which the error falls with the tolerance, between the last two points.
-      double order = 1;
-      if (last && last->rtol() != point.rtol() && last->largest() > 0 && error > AccuracyChoice::kRounding)
-        order = std::log(error / last->largest()) / std::log(point.rtol() / last->rtol());
-      order = std::isfinite(order) ? std::clamp(order, 0.5, 1.5) : 1;
+      if (!best || is_better(point, *best)) best = point;
       const bool within = error <= result_.wanted, looser_before = last && last->rtol() > point.rtol();
-      if (!best || (within ? best->largest() > result_.wanted || point.rtol() > best->rtol()
-                           : point.largest() < best->largest()))
-        best = point;
       if (within && (looser_before || error > 0.03 * result_.wanted || point.rtol() >= kLoosest)) break;
-      if (!within && best->largest() <= result_.wanted) break;  // loosened too far
-      if (!within && point.rtol() <= kTightest) break;
-      const double change = std::pow(aim / error, 1 / order);
+      if (!within && (best->largest() <= result_.wanted || point.rtol() <= kTightest))
+        break;  // loosened too far, or tight
+      const double change = std::pow(aim / error, 1 / order_between(last, point, error));
       rtol = point.rtol() * (within ? std::min(change, 100.0) : std::clamp(change, 1e-4, 0.3));
       last = std::move(point);
       if (within && rounded(std::clamp(rtol, kTightest, kLoosest)) <= last->rtol()) break;
     }
     return best;
+  }
+
+  // Within the wanted accuracy, the looser tolerance; else the smaller error.
+  bool is_better(const Point& point, const Point& best) const {
+    if (point.largest() > result_.wanted) return point.largest() < best.largest();
+    return best.largest() > result_.wanted || point.rtol() > best.rtol();
+  }
+
+  // The order in which the error falls with the tolerance, between the last two points.
+  static double order_between(const std::optional<Point>& last, const Point& point, double error) {
+    if (!last || last->rtol() == point.rtol() || !(last->largest() > 0) || error <= AccuracyChoice::kRounding) return 1;
+    const double order = std::log(error / last->largest()) / std::log(point.rtol() / last->rtol());
+    return std::isfinite(order) ? std::clamp(order, 0.5, 1.5) : 1;
   }
 
   std::optional<Point> failed(const Answer& answer, std::optional<Point> best) {
