@@ -106,8 +106,7 @@ Json reactions_json(const MovingState& state) {
 Json points_json(std::vector<Eigen::Vector3d> points) {
   const auto coordinates = [](const Eigen::Vector3d& p) { return std::tuple(p.x(), p.y(), p.z()); };
   std::ranges::sort(points, {}, coordinates);
-  const auto [same, end] = std::ranges::unique(points, {}, coordinates);
-  points.erase(same, end);
+  points.erase(std::unique(points.begin(), points.end()), points.end());
   return json_list(points, [](const Eigen::Vector3d& p) { return rounded(p); });
 }
 

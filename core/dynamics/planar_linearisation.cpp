@@ -144,7 +144,7 @@ void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRo
 
 // Adds the tangents of laws and of all constraints except points, by dual numbers.
 void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneRows& y_dir) {
-  using Order = PlanarConstraints::Order;
+  using RowOrder = PlanarConstraints::Order;
   const StateLayout layout{data_.n};
   for (const std::size_t k : dual_bodies_) {
     const Body& b = bodies_[k];
@@ -157,16 +157,16 @@ void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneR
     };
     f.set_turn(turn(b.P, 0), turn(b.Pdot, 2), b.omegadot);
   }
-  const auto add = [&](Order order, double factor, const LaneRows& rows, std::vector<Lanes<3>>& loads) {
+  const auto add = [&](RowOrder order, double factor, const LaneRows& rows, std::vector<Lanes<3>>& loads) {
     for (Lanes<3>& load : loads) load.setZero();
     constraints_.tangents(order, dual_frames_, laws_, angles_, block, lambda_, constraint_dirs_, loads);
     gamma_dir_ -= factor * rows;
   };
   if (formulation_.omega != 0) {
-    add(Order::phi, formulation_.omega * formulation_.omega, constraint_dirs_.phi, load_dirs_);
-    add(Order::phi_dot, 2 * formulation_.xi * formulation_.omega, constraint_dirs_.phi_dot, load_dirs_);
+    add(RowOrder::phi, formulation_.omega * formulation_.omega, constraint_dirs_.phi, load_dirs_);
+    add(RowOrder::phi_dot, 2 * formulation_.xi * formulation_.omega, constraint_dirs_.phi_dot, load_dirs_);
   }
-  add(Order::phi_ddot, 1, constraint_dirs_.phi_ddot, load_dirs_);
+  add(RowOrder::phi_ddot, 1, constraint_dirs_.phi_ddot, load_dirs_);
   for (std::size_t i = 0; i < rhs_lanes_.size(); ++i) rhs_lanes_[i] -= load_dirs_[i + 1];
 }
 

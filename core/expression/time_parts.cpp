@@ -24,21 +24,21 @@ constexpr std::size_t kMostPieces = 1 << 15;
 }  // namespace
 
 std::vector<Program> ProgramBuilder::time_parts_of(const Program& program, int parameters, int time) {
-  enum Kind : char { constant, linear, curved, sampled, of_motion };  // a value is at least as its operands are
+  enum Kind : char { fixed, linear, curved, sampled, of_motion };  // a value is at least as its operands are
   std::vector<Kind> kinds;
   std::set<std::pair<int, Operation>> parts;
   for (const Instruction& in : program.code_) {
     if (operands(in.operation) == 0) {
       const bool is_name = in.operation == Operation::name;
-      kinds.push_back(!is_name || (in.a < parameters && in.a != time) ? constant : in.a == time ? linear : of_motion);
+      kinds.push_back(!is_name || (in.a < parameters && in.a != time) ? fixed : in.a == time ? linear : of_motion);
       continue;
     }
-    const auto kind = [&](int k) { return k < 0 ? constant : kinds[static_cast<std::size_t>(k)]; };
+    const auto kind = [&](int k) { return k < 0 ? fixed : kinds[static_cast<std::size_t>(k)]; };
     const Operation f = in.operation;
     Kind here = std::max(kind(in.a), kind(in.b));
     if (here == linear) {
-      const bool scales = f == Operation::multiply ? std::min(kind(in.a), kind(in.b)) == constant
-                                                   : f == Operation::divide && kind(in.b) == constant;
+      const bool scales = f == Operation::multiply ? std::min(kind(in.a), kind(in.b)) == fixed
+                                                   : f == Operation::divide && kind(in.b) == fixed;
       const bool sums = f == Operation::add || f == Operation::subtract || f == Operation::negate;
       here = f == Operation::curve && !program.curve_of(in).curve->is_routine() ? sampled
              : sums || scales                                                   ? linear

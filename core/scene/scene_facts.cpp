@@ -253,7 +253,8 @@ std::optional<std::array<double, 3>> SceneFacts::value(const PointField& field, 
 
 const SceneFacts::Scale& SceneFacts::scale() const {
   if (scale_) return *scale_;
-  auto& [length, mass] = scale_.emplace();
+  scale_ = Scale{};
+  double &length = scale_->length, &mass = scale_->mass;
   const auto add = [&](const PointField& point, const std::string& owner) {
     if (const auto x = value(point, owner)) length = std::max(length, std::hypot((*x)[0], (*x)[1], (*x)[2]));
   };

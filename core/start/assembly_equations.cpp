@@ -83,8 +83,9 @@ void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) 
   for (const RowGroup& g : data_.groups) {
     if (!g.shared) continue;
     const Constraint* last = nullptr;
-    for (const Constraint& c : std::ranges::equal_range(data_.constraints, g.row, {}, &Constraint::row))  // they ascend
-      if (std::holds_alternative<Angle>(c.primitive)) last = &c;
+    auto c = std::ranges::lower_bound(data_.constraints, g.row, {}, &Constraint::row);  // they ascend
+    for (; c != data_.constraints.end() && c->row == g.row; ++c)
+      if (std::holds_alternative<Angle>(c->primitive)) last = &*c;
     if (!last || last->factor == 0) continue;
     ConstraintTerms(data_).phi(bodies.frames, laws_, angles, phi);
     double& angle = angles(last->angle);

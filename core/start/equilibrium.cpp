@@ -194,7 +194,6 @@ class Statics {
   const MechanismData& d_;
   double t_;
   const StateLayout layout_;
-  const Index freedoms_ = 6 * layout_.n;  // of the bodies without joints
   double length_ = 1;
   SpatialDynamics dynamics_;
   std::unique_ptr<Projector> projector_;

@@ -82,14 +82,14 @@ void StiffnessWatch::add_to(SimulationStatistics& statistics) {
 }
 
 bool is_stability_limited(const SimulationStatistics& statistics) {
-  constexpr long kFewest = 50;
-  return statistics.watched_steps >= kFewest && 2 * statistics.stability_limited_steps >= statistics.watched_steps;
+  constexpr long kEnough = 50;
+  return statistics.watched_steps >= kEnough && 2 * statistics.stability_limited_steps >= statistics.watched_steps;
 }
 
 bool may_spoil_derivatives(const SimulationStatistics& statistics) {
-  constexpr long kFewest = 1000;
+  constexpr long kMany = 1000;
   return is_stability_limited(statistics) ||
-         (statistics.watched_steps >= kFewest && 10 * statistics.stability_limited_steps >= statistics.watched_steps);
+         (statistics.watched_steps >= kMany && 10 * statistics.stability_limited_steps >= statistics.watched_steps);
 }
 
 std::string stiffness_warning(const SimulationStatistics& statistics, const std::string& integrator,

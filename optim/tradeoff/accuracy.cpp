@@ -185,11 +185,7 @@ class Chooser {
         continue;
       }
       max_steps = base_.integrator.max_steps;
-      if (!right || right_rtol > 1.01 * point.rtol() / kTighter) {
-        Answer verified = verifying(point.rtol(), right_rtol);
-        if (!verified.ok && !right) return failed(verified, std::move(best));
-        if (verified.ok) right = std::move(verified), right_rtol = result_.verified_by.rtol;
-      }
+      if (const auto failure = renew(right, right_rtol, point.rtol())) return failed(*failure, std::move(best));
       judge(point, *right);
       const double error = std::max(point.largest(), AccuracyChoice::kRounding), aim = result_.wanted / 3;
       if (high_order_is_cheaper(point, *right, error, aim)) {
@@ -209,6 +205,14 @@ class Chooser {
       if (within && rounded(std::clamp(rtol, kTightest, kLoosest)) <= last->rtol()) break;
     }
     return best;
+  }
+
+  // Renews the right answer if it is not much more exact than runs at rtol. Returns the failed run if there is none.
+  std::optional<Answer> renew(std::optional<Answer>& right, double& right_rtol, double rtol) {
+    if (right && right_rtol <= 1.01 * rtol / kTighter) return {};
+    Answer verified = verifying(rtol, right_rtol);
+    if (verified.ok) right = std::move(verified), right_rtol = result_.verified_by.rtol;
+    return right ? std::nullopt : std::optional(std::move(verified));
   }
 
   // Within the wanted accuracy, the looser tolerance; else the smaller error.
