@@ -31,8 +31,8 @@ namespace mbsopt::inline optim {
 // tlm and adjoint are the derivatives of the computed numbers; CVODES has none of these and gives its own. With
 // cvodes_*, CVODES computes the motion and its continuous sensitivities for any integrator of the scene (cvodes.hpp).
 enum class GradientMethod { automatic, tlm, adjoint, cvodes_forward, cvodes_adjoint, differences };
-std::string_view to_string(
-    GradientMethod method);  // in this order: auto, tlm, adjoint, cvodes_forward, cvodes_adjoint, fd
+// In this order: auto, tlm, adjoint, cvodes_forward, cvodes_adjoint, fd.
+std::string_view to_string(GradientMethod method);
 
 struct DifferenceSettings {
   double relative_step = 4e-3;  // the largest: of the parameter's value, or of 1 where that is 0
