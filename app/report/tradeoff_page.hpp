@@ -1,4 +1,4 @@
-// What `tradeoff` found: in result.json, at the terminal and on the page.
+// Writes the figures of `tradeoff` to result.json, the terminal and the page.
 #pragma once
 
 #include "app/report/run_page.hpp"

@@ -58,13 +58,12 @@ class StepAttempt {
   void restart();          // accelerations jump at the start: implicit stages forget the step before
   bool keeps_sizes() const { return implicit_.has_value(); }  // a new size costs a factor
 
-  // Of explicit methods through closed loops: the number of responses, or 0, and those at the end
-  // (Projector::response).
+  // Explicit methods through closed loops have responses at the end (Projector::response); others have none.
   Eigen::Index responses() const { return response_.size(); }
   const Eigen::VectorXd& response();
   double projected_error() const { return projected_error_; }  // that projection took out, in tolerances
 
-  // Of the accelerations: in accepted steps, and in all that were rejected (Dynamics).
+  // These residuals are of the accelerations, in accepted and in rejected steps (Dynamics).
   double worst_residual() const { return dynamics_.worst_residual(); }
   double worst_of_rejected() const { return worst_of_rejected_; }
   Projector& projector() { return *projector_; }

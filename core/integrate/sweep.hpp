@@ -1,4 +1,4 @@
-// What the tangent-linear and the adjoint sweep share: the equations of a step, linearised where it was solved, and the
+// The tangent-linear and the adjoint sweep share the equations of a step, linearised where it was solved, and the
 // gradients of running costs at its nodes.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What runs by all methods do at their start, after each step, and at their end.
+// Runs by all methods do the same at their start, after each step, and at their end.
 #pragma once
 
 #include <span>

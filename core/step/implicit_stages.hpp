@@ -77,8 +77,8 @@ class ImplicitStages {
   double add_change(const Step& step, const StageGroup& group, const Matrix& m, bool exact);
   bool iterate(Step& step, const StageGroup& group, Matrix& m, Goal goal, bool own);
   enum class Convergence { reached, ahead, lost };
-  // Of an iteration that changes the stages by `now`, after one that changed them by `before` with the same matrix
-  // (infinite: there is none), with `left` more allowed.
+  // Judges an iteration that changes the stages by `now`, after one that changed them by `before` with the same matrix
+  // (infinite: there is none). `left` more are allowed.
   Convergence judged(double now, double before, long left, Goal goal, bool own);
 
   const MechanismData& data_;

@@ -1,4 +1,4 @@
-// What looks at a run while it goes on. All of it has one signature, by whatever method the run is integrated:
+// An observer looks at a run while it goes on. All have one signature, by whatever method the run is integrated:
 //
 //   begin(start)        at the start of the run
 //   split(step)         each step that could be accepted: where it should end instead

@@ -100,7 +100,7 @@ struct DesignResult : SolverOutcome {
   }
 };
 
-// What the problem does not give.
+// These options are not in the problem.
 struct DesignOptions {
   GradientMethod method = GradientMethod::automatic;
   std::vector<std::shared_ptr<const UserForce>> user_forces;
