@@ -102,6 +102,8 @@ struct Decay {
   Problem problem = repetitions::slider(50, 0.4);
   std::vector<CsvTable> data;
   Decay(bool windows, bool continuity, double tau) {
+    problem.scene.simulation.integrator.rtol = 1e-6;  // far below the noise of 2 %
+    problem.scene.simulation.integrator.atol = 1e-8;
     problem.identification.emplace();
     problem.identification->variables = {"k", "c"};
     problem.identification->experiments = {repetitions::slider_run("run", {"x0", "v0"})};
