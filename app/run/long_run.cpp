@@ -56,6 +56,7 @@ long LongRun::seed(const std::string& of, const std::optional<long>& given) {
 
 void LongRun::begin() {
   if (journal_) return;
+  interrupted();  // listens: from here on a signal ends the run in words
   const std::filesystem::path& folder = run.folder.path();
   const Json header = header_of(run, seeds_);
   if (!run.context.options.resume) {
