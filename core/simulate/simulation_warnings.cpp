@@ -20,6 +20,7 @@ constexpr double kGivingWay = 1e-8;        // of the accelerations; gradients ha
 constexpr double kTakenOut = 1e-4;         // by projections: those of the integration errors are of the order of rtol
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
 constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
+constexpr double kUnresolvedPeaks = 0.3;   // of that of an exponential: the extreme errs by its logarithm/sharpness
 constexpr double kWithinSteps = 100;       // tolerances: two of the requested digits
 constexpr double kPulse = 1e-4;            // of velocities: what a pulse adds that fixed steps pass over
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
@@ -110,8 +111,8 @@ Warning contradicting_joints(const SimulationSettings& settings, const Simulatio
 
 // first: what to try before shorter steps, a sentence.
 Warning unresolved(const SimulationSettings& settings, bool solved, const QuadratureError& worst, const char* what,
-                   const char* consequence, const char* first = "") {
-  if (!(worst.error > kUnresolved) || worst.of.empty()) return {};
+                   const char* consequence, double limit = kUnresolved, const char* first = "") {
+  if (!(worst.error > limit) || worst.of.empty()) return {};
   constexpr const char* kCvodes = ", or take cvodes_bdf or cvodes_adams, which control this error";
   return fmt::format(
       "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
@@ -186,7 +187,7 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
     if (add(warning(settings, statistics))) break;
   add(unresolved(settings, statistics.solved, statistics.quadrature, "the running cost", "its integral"));
   add(unresolved(settings, statistics.solved, statistics.extreme_quadrature, "the peaks",
-                 "the integral of their exponential",
+                 "the integral of their exponential", kUnresolvedPeaks,
                  "Give it less `sharpness`: some tens to hundreds, divided by the range of its values. "));
   add(unresolved(settings, statistics.solved, statistics.gradient_quadrature, "the derivative of the integrand",
                  "the gradient"));

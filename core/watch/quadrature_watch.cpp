@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/body/hermite.hpp"
 #include "core/mechanism/mechanism_data.hpp"
@@ -54,6 +55,8 @@ QuadratureWatch::QuadratureWatch(const Mechanism& mechanism, const Method& metho
       of_values_(what == Of::values),
       motion_(motion),
       nodes_(quadrature_nodes(method.nodes, method.node_c, method.node_b, node_of_)),
+      weights_(std::accumulate(nodes_.begin(), nodes_.end(), 0.0,
+                               [](double sum, const QuadratureNode& node) { return sum + std::abs(node.b); })),
       integrals_((of_values_ ? 1 : 2) * costs.size()),
       g_(integrals_.size() * static_cast<std::size_t>(method.nodes), 0.0),
       distinct_(nodes_.size()) {
@@ -114,7 +117,7 @@ double QuadratureWatch::add_error(const Step& step, std::size_t integrand, std::
     power = 1;
   }
   if (!(size > 0 && std::isfinite(size))) return 0;  // the end of the run reports it
-  integral.of_size += size;
+  integral.of_size += size / weights_;
   const double share = std::min(1.0, std::abs(difference) / size);
   const double error = size * std::pow(share, static_cast<double>(method_.order) / power);
   integral.error += error;

@@ -76,6 +76,7 @@ class QuadratureWatch {
   MotionSource* motion_;
   std::vector<int> node_of_;
   const std::vector<QuadratureNode> nodes_;
+  const double weights_;  // sum of |b|: 1, and 13 of dopri853, whose weights have both signs
   std::vector<Integral> integrals_;
   double start_ = 0, end_ = 0;    // of all steps [s], which go forward or backward
   std::vector<double> g_;         // at each node, of each integrand

@@ -57,9 +57,12 @@ IntegrationError integration_error(const Evaluator& evaluator, const Evaluation&
 }
 
 bool may_be_unresolved(const Evaluator& evaluator, const Evaluation& e) {
-  constexpr double kDrift = 0.1;  // derivatives of a motion that leaves the constraints are off by more than it is
+  constexpr double kPessimistic = 2;  // estimates of integrals are at least so many times their errors
+  constexpr double kDrift = 0.1;      // derivatives of a motion that leaves the constraints are off by more than it is
   const SimulationStatistics& s = e.statistics;
-  if (std::max({s.quadrature.error, s.extreme_quadrature.error, s.gradient_quadrature.error}) > kResolved) return true;
+  if (std::max({s.quadrature.error, s.extreme_quadrature.error, s.gradient_quadrature.error}) >
+      kPessimistic * kResolved)
+    return true;
   const IntegratorSettings& given = evaluator.scene().simulation.integrator;
   if (given.step) return false;
   if (s.relative_position_violation > kDrift * kResolved) return true;

@@ -100,6 +100,25 @@ TEST_CASE("a running cost that the steps do not resolve is a warning with its na
   }
 }
 
+// dopri853 has weights of both signs, whose sizes add up to 13 times the step.
+TEST_CASE("a running cost that turns within a small part of the run is right, or a warning", "[extremes]") {
+  const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "radau5");
+  for (double turns = 200; turns < 2000; turns *= 1.3) {
+    const auto g = [&](double t) { return 0.1 + std::cos(turns * std::exp(-std::pow((t - 0.5) / 0.01, 2))); };
+    double exact = 0;
+    constexpr int kParts = 200'000;
+    for (int i = 0; i < kParts; ++i) exact += g((i + 0.5) / kParts) / kParts;
+    const Json p =
+        judged(fmt::format("0.1 + cos({}*exp(-((t - 0.5 + 1e-12*theta)/0.01)^2))", turns), method);  // of the state
+    const Outcome run = values(p);
+    REQUIRE(run.ok());
+    INFO(method << ", " << turns << ": " << run("judged") << " for " << exact << ", estimate "
+                << run.statistics().quadrature.error);
+    CHECK((std::abs(run("judged") - exact) < 0.02 * std::abs(exact) ||
+           warnings_of(p).find("do not resolve the running cost") != std::string::npos));
+  }
+}
+
 TEST_CASE("a peak of time alone is right, or a warning where few stages notice its feet", "[extremes]") {
   const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "radau5", "sdirk4");
   const double top = GENERATE(0.31, 0.50123);
