@@ -26,7 +26,6 @@ using Ipopt::Number;
 using VectorIn = Eigen::Map<const Eigen::VectorXd>;
 using VectorView = Eigen::Map<Eigen::VectorXd>;
 
-constexpr int kFreshStarts = 2;
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
 
 // Ipopt's linear solver, MUMPS, takes some MB at once. Without this memory Ipopt reports an error in its step. So this
@@ -36,17 +35,8 @@ void require_memory() {
   ::operator delete(::operator new(kOfMumps));
 }
 
-// Why a round ends before Ipopt would end it.
-//   optimal     an iterate is stationary to the tolerance, by the measure of all methods (optimality.hpp)
-//   stalled     ten iterations have changed f by noise only, which a line search would try to lower without end
-enum class SearchEnd { none, optimal, stalled };
-constexpr int kStalled = 10;  // iterations
-
-struct Iterate {
-  Eigen::VectorXd x;
-  double f = 0;         // scaled: its size and gradient about 1 at the start
-  double distance = 0;  // optimality
-};
+// Iterations in which f changes by noise only, which a line search would try to lower without end.
+constexpr int kStalled = 10;
 
 class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
  public:
@@ -55,28 +45,24 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     result_.x = x_start;
   }
 
-  // From a far start a barrier method may leave the valley of a good point for a worse one. Then it starts once more at
-  // the good point.
   void run() {
     if (!evaluate(x_start_)) return end_refused();
-    if (start_is_optimal()) return;
-    result_.end(SolverStatus::failed, "Ipopt refused its options");
-    while (round_ <= kFreshStarts) {
-      const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
-      set_options(*application->Options());
-      if (application->Initialize("") != Ipopt::Solve_Succeeded) break;  // "": no options file is read
-      end_round(application->OptimizeTNLP(this));
-      const bool ended = result_.status == SolverStatus::converged || result_.status == SolverStatus::no_progress;
-      if (!ended || !passed_a_better_point()) break;
-      go_on_from_best();
+    if (const double distance = look(*point_); distance <= tolerance_) {  // the barrier would only lead away
+      report(*point_, distance);
+      return conclude({});
     }
-    finish();
+    result_.end(SolverStatus::failed, "Ipopt refused its options");
+    const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
+    set_options(*application->Options());
+    if (application->Initialize("") == Ipopt::Solve_Succeeded)  // "": no options file is read
+      end(application->OptimizeTNLP(this));
   }
 
   bool get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_hess, IndexStyleEnum& style) override {
     n = static_cast<Index>(problem_.variables());
     m = static_cast<Index>(problem_.constraints());
-    nnz_jac = n * m, nnz_hess = options_.second_order ? n * (n + 1) / 2 : 0;
+    nnz_jac = n * m;
+    nnz_hess = options_.second_order ? n * (n + 1) / 2 : 0;
     style = C_STYLE;
     return true;
   }
@@ -85,14 +71,16 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     auto finite = [](double bound) { return std::isfinite(bound) ? bound : std::copysign(kNoBound, bound); };
     VectorView(x_l, n) = near_bounds(problem_.x_lower, x_start_).unaryExpr(finite);
     VectorView(x_u, n) = near_bounds(problem_.x_upper, x_start_).unaryExpr(finite);
-    VectorView(c_l, m) = problem_.c_lower.unaryExpr(finite), VectorView(c_u, m) = problem_.c_upper.unaryExpr(finite);
+    VectorView(c_l, m) = problem_.c_lower.unaryExpr(finite);
+    VectorView(c_u, m) = problem_.c_upper.unaryExpr(finite);
     return true;
   }
 
   bool get_scaling_parameters(Number& f_scaling, bool& use_x, Index, Number*, bool& use_c, Index m,
                               Number* c_scaling) override {
     f_scaling = problem_.f_scale;
-    use_x = false, use_c = m > 0;
+    use_x = false;
+    use_c = m > 0;
     if (use_c) VectorView(c_scaling, m) = problem_.c_scale;
     return true;
   }
@@ -156,46 +144,29 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   bool intermediate_callback(Ipopt::AlgorithmMode, Index iteration, Number, Number, Number, Number, Number, Number,
                              Number, Number, Index, const Ipopt::IpoptData*,
                              Ipopt::IpoptCalculatedQuantities*) override {
-    if (round_ > 0 && iteration == 0) return true;  // the start of this round
-    if (point_->abandoned) return false;            // Ipopt counts a step that was not computed
-    result_.iterations = iterations_before_ + iteration;
+    if (point_->abandoned) return false;  // Ipopt counts a step that was not computed
+    result_.iterations = iteration;
     out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
     if (iterate_.size() == 0 || !evaluate(iterate_)) return !out_of_evaluations_;  // it is in memory
     const double distance = optimality(problem_, iterate_, *point_);
     if (!report(*point_, distance)) return false;
-    if (feasible(*point_)) look_at_iterate(distance);
-    return !out_of_evaluations_ && end_ == SearchEnd::none;
+    has_settled_ = feasible(*point_) && (distance <= tolerance_ || is_stalled());
+    return !out_of_evaluations_ && !has_settled_;
   }
 
-  // If this class ended the run, it has already chosen the end point.
-  void finalize_solution(Ipopt::SolverReturn, Index n, const Number* x, const Number*, const Number*, Index,
-                         const Number*, const Number*, Number, const Ipopt::IpoptData*,
-                         Ipopt::IpoptCalculatedQuantities*) override {
-    if (end_ != SearchEnd::optimal && end_ != SearchEnd::stalled) final_ = VectorIn(x, n);
-  }
+  void finalize_solution(Ipopt::SolverReturn, Index, const Number*, const Number*, const Number*, Index, const Number*,
+                         const Number*, Number, const Ipopt::IpoptData*, Ipopt::IpoptCalculatedQuantities*) override {}
 
  private:
-  // Returns whether the start is feasible and the objective falls nowhere within the bounds. The barrier would only
-  // lead away.
-  bool start_is_optimal() {
-    const double distance = look(*point_);
-    if (distance > tolerance_) return false;
-    take_solution();
-    report(*point_, distance);
-    end_start_optimal();
-    return true;
-  }
-
   void set_options(Ipopt::OptionsList& list) const {
-    const bool constrained = problem_.constraints() > 0;
     list.SetIntegerValue("print_level", 0);
     list.SetStringValue("sb", "yes");  // no banner
-    list.SetIntegerValue("max_iter", std::max(0, options_.max_iterations - result_.iterations));
+    list.SetIntegerValue("max_iter", options_.max_iterations);
     list.SetStringValue("hessian_approximation", options_.second_order ? "exact" : "limited-memory");
     list.SetIntegerValue("limited_memory_max_history", options_.history);
     // Newton steps converge faster than the barrier falls from its usual 0.1. BFGS needs that time to learn.
     if (options_.second_order) list.SetNumericValue("mu_init", 1e-3);
-    if (options_.second_order && !constrained) {  // all matrices are positive definite: Newton's steps need no barrier
+    if (options_.second_order && problem_.constraints() == 0) {  // all matrices are positive definite: no barrier
       list.SetNumericValue("mu_init", 0.1 * tolerance_);
       list.SetStringValue("bound_mult_init_method", "mu-based");  // multipliers of 1 would count as curvature
     }
@@ -204,6 +175,10 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     list.SetStringValue("mu_strategy", "monotone");
     list.SetNumericValue("bound_relax_factor", 0);  // a bound is a bound: masses and logarithms stay positive
     list.SetNumericValue("tol", tolerance_);
+    // The product of a bound's multiplier and slack. The measure of all methods takes the smaller of the two.
+    const double complementarity = tolerance_ * tolerance_ / problem_.f_scale;  // unscaled
+    list.SetNumericValue("compl_inf_tol", complementarity);
+    list.SetNumericValue("acceptable_compl_inf_tol", complementarity);
     list.SetNumericValue("constr_viol_tol", options_.constraint_tolerance);
     // Simulations have noise. If optimality stays just above the tolerance and f (about 1 in size) changes by less than
     // the tolerance implies (f - f* = f_x^2/(2 f_xx)), no further progress is possible.
@@ -216,30 +191,26 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
       list.SetStringValue("bound_mult_init_method", "mu-based");
       for (const char* const push : {"bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"})
         list.SetNumericValue(push, 1e-8);
-    } else if (round_ > 0) {  // near the solution
-      if (!options_.second_order || constrained) list.SetNumericValue("mu_init", 1e-4);
-      list.SetNumericValue("bound_push", 1e-6), list.SetNumericValue("bound_frac", 1e-6);
     }
   }
 
-  void end_round(Ipopt::ApplicationReturnStatus status) {
+  void end(Ipopt::ApplicationReturnStatus status) {
     using namespace Ipopt;  // NOLINT: its enumerators
-    if (end_ == SearchEnd::optimal) return end_optimal();
-    if (end_ == SearchEnd::stalled) return result_.end(SolverStatus::no_progress, {});  // until finish()
+    if (has_settled_)
+      return conclude(
+          fmt::format("in {} the objective has changed by no more than noise", counted(kStalled, "iteration")));
     if (status == Error_In_Step_Computation || status == Restoration_Failed || status == Internal_Error)
       require_memory();
+    take_solution();
     switch (status) {
       case Solve_Succeeded:
-        return end_optimal();
       case Solved_To_Acceptable_Level:
-        return end_settled(0, {});
       case Search_Direction_Becomes_Too_Small:
       case Restoration_Failed:
       case Error_In_Step_Computation:
       case Feasible_Point_Found:
-        return end_settled(kUnknown, "no step lowers the objective any more");
       case Infeasible_Problem_Detected:
-        return end_infeasible();
+        return conclude("no step lowers the objective any more");
       case Maximum_Iterations_Exceeded:
       case Maximum_CpuTime_Exceeded:
         return result_.end_at_limit(options_.max_iterations, "iteration");
@@ -259,47 +230,6 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     }
   }
 
-  // Returns whether a feasible point on the way is better than Ipopt's end point by more than the tolerance.
-  bool passed_a_better_point() {
-    if (final_.size() == 0 || !evaluate(final_)) return false;
-    return best_is_feasible() && (point_->f - best().f) * problem_.f_scale > tolerance_;
-  }
-
-  void go_on_from_best() {
-    x_start_ = best_x();
-    iterations_before_ = result_.iterations;
-    recent_.clear(), end_ = SearchEnd::none;
-    ++round_;
-  }
-
-  // Ipopt gives up if the noise of a constraint exceeds its tolerance, or no step lowers the objective by more than
-  // noise. The best point may still be optimal.
-  void finish() {
-    if (result_.status == SolverStatus::converged && passed_a_better_point())
-      result_.end(SolverStatus::no_progress,
-                  "no further progress: the search ends at worse points than the best one that it has passed, which is "
-                  "the result; scale the problem, or give tighter bounds" +
-                      result_.failures());
-    take_solution();
-    const double distance = optimality(problem_, result_.x, result_.point);
-    if (end_ == SearchEnd::stalled)
-      end_settled(distance,
-                  fmt::format("in {} the objective has changed by no more than noise", counted(kStalled, "iteration")));
-    const SolverStatus status = result_.status;
-    if (status == SolverStatus::converged && distance > tolerance_)
-      result_.message += fmt::format(" (as Ipopt measures them; by the measure of all methods to {:.1e})", distance);
-    if (!best_is_feasible()) return;
-    if ((status == SolverStatus::no_progress || status == SolverStatus::infeasible) &&
-        distance <= kAcceptable * tolerance_) {
-      end_settled(distance, {});
-    } else if (status == SolverStatus::infeasible) {
-      result_.end(SolverStatus::no_progress,
-                  "no further progress: the constraints can be held, but not while the objective is lowered; try "
-                  "tighter simulation tolerances, or another start" +
-                      result_.failures());
-    }
-  }
-
   // Interior points may leave the bounds by a rounding error; NlpSearch moves them back.
   bool evaluate(const Eigen::VectorXd& x) {
     point_ = &at(x, Wanted::derivatives);
@@ -307,22 +237,13 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     return point_->ok;
   }
 
-  // Ipopt would continue. The iterate is feasible.
-  void look_at_iterate(double distance) {
-    if (distance <= tolerance_) {
-      end_ = SearchEnd::optimal, final_ = iterate_;
-      return;
-    }
-    recent_.push_back({iterate_, point_->f * problem_.f_scale, distance});
-    if (recent_.size() > kStalled + 1) recent_.pop_front();
-    if (is_stalled()) end_ = SearchEnd::stalled, final_ = std::ranges::min_element(recent_, {}, &Iterate::distance)->x;
-  }
-
-  bool is_stalled() const {
+  bool is_stalled() {
     constexpr double kNoise = 1e-2;  // times the tolerance, relative to f
+    recent_.push_back(point_->f * problem_.f_scale);
     if (recent_.size() <= kStalled) return false;
-    const auto [least, most] = std::ranges::minmax_element(recent_, {}, &Iterate::f);
-    return most->f - least->f <= std::max(tolerance_ * tolerance_, kNoise * tolerance_ * std::abs(most->f));
+    if (recent_.size() > kStalled + 1) recent_.pop_front();
+    const auto [least, most] = std::ranges::minmax(recent_);
+    return most - least <= std::max(tolerance_ * tolerance_, kNoise * tolerance_ * std::abs(most));
   }
 
   // The Hessian of f. If it is not positive definite and there are no constraints, BFGS replaces it: negative curvature
@@ -358,16 +279,15 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
     secants_.add(iterate_, point_->f_x);
   }
 
-  Eigen::VectorXd x_start_;
+  const Eigen::VectorXd x_start_;
   const IpoptOptions& options_;
   SecantCurvature secants_;
   const NlpPoint* point_ = nullptr;  // the last one
-  Eigen::VectorXd final_, iterate_, hessians_x_;
+  Eigen::VectorXd iterate_, hessians_x_;
   NlpHessians hessians_;
-  std::deque<Iterate> recent_;       // of this round, oldest first
-  SearchEnd end_ = SearchEnd::none;  // of this round, if it ends here
+  std::deque<double> recent_;  // f of the last feasible iterates, scaled: its size and gradient about 1 at the start
   bool out_of_evaluations_ = false;
-  int round_ = 0, iterations_before_ = 0;
+  bool has_settled_ = false;  // an iterate is optimal by the measure of all methods (optimality.hpp), or f has stalled
 };
 
 }  // namespace

@@ -28,9 +28,6 @@ using VectorView = Eigen::Map<VectorXd>;
 
 constexpr int kFailuresInARow = 40;     // of local methods, which then end
 constexpr double kFirstStep = 0.1;      // of x, without derivatives
-constexpr int kFreshStarts = 2;         // restarts of local methods with gradients, from their best point
-constexpr long kCreeping = 50;          // evaluations in which methods of separable models have to gain
-constexpr double kLeastGain = 0.01;     // part of f; in a narrow valley the gain is less, and slsqp continues
 constexpr long kRequestsPerPoint = 20;  // requests of stored points; beyond it a method repeats itself
 
 using Optimizer = std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)>;
@@ -81,29 +78,16 @@ class NloptSearch : private NlpSearch {
     if (method_.random) nlopt_srand(options_.seed);
     result_.algorithm = nlopt_algorithm_name(algorithm_);
     if (augmented) result_.algorithm = std::string(nlopt_algorithm_name(NLOPT_AUGLAG)) + ": " + result_.algorithm;
-    if (ended_) {  // at the start already
-      opt_ = nullptr;
-      take_solution();
-      if (result_.status == SolverStatus::converged) end_start_optimal();
-      return;
+    if (!ended_) {
+      VectorXd x = x_start;
+      double f = 0;
+      const nlopt_result code = nlopt_optimize(opt_, x.data(), &f);
+      if (const char* const words = nlopt_get_errmsg(opt_)) library_message_ = words;
+      if (exception_) std::rethrow_exception(exception_);
+      if (!ended_) end_by_itself(code);
     }
-    VectorXd x = x_start;
-    nlopt_result code = optimized(x);
-    if (is_creeping_) {
-      const Optimizer finish(nlopt_create(NLOPT_LD_SLSQP, n), nlopt_destroy);
-      hand_over_to(finish.get(), x_start);
-      x = best_x();
-      code = optimized(x);
-      opt_ = outer.get();
-    }
-    if (const char* const words = nlopt_get_errmsg(opt_)) library_message_ = words;
     opt_ = nullptr;
-    if (exception_) std::rethrow_exception(exception_);
     take_solution();
-    if (!ended_) end_by_itself(code);
-    if (handed_over_)
-      result_.message += fmt::format("; {} had hardly gained any more in {}, so slsqp went on from its best point",
-                                     method_.name, counted(kCreeping, "evaluation"));
   }
 
  private:
@@ -122,38 +106,6 @@ class NloptSearch : private NlpSearch {
     nlopt_set_min_objective(opt_, objective, this);
     add(inequalities_, nlopt_add_inequality_mconstraint);
     add(equalities_, nlopt_add_equality_mconstraint);
-  }
-
-  // Starts at x, which becomes the end point.
-  nlopt_result optimized(VectorXd& x) {
-    nlopt_result code = NLOPT_SUCCESS;
-    for (int round = 0; round <= kFreshStarts; ++round) {
-      const double f_before = best().f;
-      double f = 0;
-      code = nlopt_optimize(opt_, x.data(), &f);
-      // A line search that stalls with its learnt curvature may progress without it.
-      if (ended_ || (is_creeping_ && !handed_over_) || !stalled() || !(best().f < f_before)) break;
-      x = best_x();
-    }
-    return code;
-  }
-
-  void hand_over_to(nlopt_opt finish, const VectorXd& x_start) {
-    opt_ = finish, handed_over_ = true;
-    limit(opt_, x_start);
-    state_program();
-    result_.algorithm +=
-        fmt::format(", from evaluation {} on {}", result_.evaluations + 1, nlopt_algorithm_name(NLOPT_LD_SLSQP));
-  }
-
-  // Separable models do not represent a valley that is oblique to the variables.
-  void look_for_gain() {
-    if (method_.constraints != ConstraintSupport::inequalities || is_creeping_ || ended_) return;
-    if (result_.evaluations < next_look_) return;
-    const double f = best().f;
-    is_creeping_ = best_is_feasible() && last_look_f_ - f <= kLeastGain * std::abs(f);
-    next_look_ = result_.evaluations + kCreeping, last_look_f_ = f;
-    if (is_creeping_ && opt_) nlopt_force_stop(opt_);
   }
 
   // Sets bounds, and the sizes of steps and changes that end the search.
@@ -239,7 +191,10 @@ class NloptSearch : private NlpSearch {
     if (point.ok) {
       f_worst_ = last_good_x_.size() > 0 ? std::max(f_worst_, point.f) : point.f;
       last_good_ = point, last_good_x_ = x();
-      if (is_local_with_gradients() && look(point) <= tolerance_ && !ended_) end_optimal(), force_stop();
+      if (is_local_with_gradients() && look(point) <= tolerance_ && !ended_) {
+        conclude({});
+        force_stop();
+      }
       if (is_best()) took_better(point);
     } else if (point.abandoned) {
       stop_on_request();
@@ -248,23 +203,16 @@ class NloptSearch : private NlpSearch {
                                                  counted(failed_in_a_row_, "evaluation"), last_error_));
     }
     if (result_.evaluations >= max_evaluations_) end_at_limit(max_evaluations_, "evaluation");
-    look_for_gain();
   }
 
   void took_better(const NlpPoint& point) {
     if (result_.evaluations > 1) ++result_.iterations;  // not the start
-    if (!report(point, method_.gradients ? optimality(problem_, x(), point) : kUnknown)) stop_on_request();
+    if (!report(point, method_.gradients ? optimality(problem_, x(), point) : NAN)) stop_on_request();
     if (options_.max_iterations && result_.iterations >= *options_.max_iterations)
       end_at_limit(*options_.max_iterations, "iteration");
   }
 
   bool is_local_with_gradients() const { return method_.gradients && !method_.global; }
-
-  bool stalled() {
-    if (!is_local_with_gradients()) return false;
-    take_solution();
-    return feasible(result_.point) && optimality(problem_, result_.x, result_.point) > kAcceptable * tolerance_;
-  }
 
   // If a point fails, its function value is high, so that the method returns. With gradients it rises along the step by
   // the decrease that the last good gradient promised. A line search then takes a quarter of its step. Without
@@ -318,14 +266,13 @@ class NloptSearch : private NlpSearch {
     if (code == NLOPT_OUT_OF_MEMORY) return end(SolverStatus::failed, "not enough memory");
     if (code == NLOPT_INVALID_ARGS)
       return end(SolverStatus::failed, fmt::format("{} refused the problem{}", method_.name, library));
-    if (!feasible(result_.point)) return end_infeasible();
+    take_solution();
+    if (is_local_with_gradients() || !feasible(result_.point)) return conclude("no step lowers the objective any more");
     if (code == NLOPT_MAXEVAL_REACHED) {  // requests of known points reached the limit
       if (method_.global) return end_searched(counted(max_evaluations_, "evaluation"));
       return end(SolverStatus::no_progress,
                  "no further progress: the method returns to points that it has already tried" + failures);
     }
-    if (is_local_with_gradients())
-      return end_settled(optimality(problem_, result_.x, result_.point), "no step lowers the objective any more");
     if (code == NLOPT_ROUNDOFF_LIMITED)
       return end(SolverStatus::converged, "converged: the steps are down to the accuracy of the objective" + failures);
     if (code < 0 && method_.global)  // mlsl: one of its local searches
@@ -352,9 +299,6 @@ class NloptSearch : private NlpSearch {
   NlpPoint last_good_, stand_in_;
   VectorXd last_good_x_;
   double f_worst_ = 0;
-  bool is_creeping_ = false, handed_over_ = false;
-  long next_look_ = kCreeping;
-  double last_look_f_ = std::numeric_limits<double>::infinity();
 };
 
 bool has_equality(const NonlinearProgram& problem) {

@@ -115,26 +115,26 @@ void NlpSearch::end_refused() {
   result_.point.ok = false;
 }
 
-void NlpSearch::end_optimal() { result_.end(SolverStatus::converged, "converged: the optimality conditions hold"); }
-
-void NlpSearch::end_start_optimal() { result_.end(SolverStatus::converged, "converged: the start is optimal already"); }
-
-void NlpSearch::end_infeasible() {
-  result_.end(SolverStatus::infeasible,
-              "infeasible: no point near the last one satisfies the constraints; relax them or start elsewhere" +
-                  result_.failures());
-}
-
-void NlpSearch::end_settled(double distance, const std::string& why) {
+void NlpSearch::conclude(const std::string& why) {
+  take_solution();
+  if (!feasible(result_.point))
+    return result_.end(SolverStatus::infeasible,
+                       "infeasible: no point near the last one satisfies the constraints; relax them or start "
+                       "elsewhere" +
+                           result_.failures());
+  const double distance = optimality(problem_, result_.x, result_.point);
+  if (distance <= tolerance_)
+    return result_.end(SolverStatus::converged, result_.evaluations == 1 ? "converged: the start is optimal already"
+                                                                         : "converged: the optimality conditions hold");
   if (distance <= kAcceptable * tolerance_)
     return result_.end(SolverStatus::converged,
                        "converged: the objective does not change any more, and the optimality conditions hold to the "
                        "accuracy of its derivatives");
-  const std::string held = std::isnan(distance) ? "do not hold" : fmt::format("hold to {:.1e} only, not", distance);
-  result_.end(SolverStatus::no_progress,
-              fmt::format("no further progress: {}, but the optimality conditions {} to {:g}; try tighter simulation "
-                          "tolerances, or a larger optimiser tolerance{}",
-                          why, held, tolerance_, result_.failures()));
+  result_.end(
+      SolverStatus::no_progress,
+      fmt::format("no further progress: {}, but the optimality conditions hold to {:.1e} only, not to {:g}; try "
+                  "tighter simulation tolerances, or a larger optimiser tolerance{}",
+                  why, distance, tolerance_, result_.failures()));
 }
 
 }  // namespace mbsopt::inline optim

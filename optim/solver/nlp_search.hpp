@@ -1,4 +1,4 @@
-// The base of Ipopt's and NLopt's adapters: the points of a search, its solution among them, and the words of its end.
+// The base of Ipopt's and NLopt's adapters: the points of a search, its solution among them, and the verdict on it.
 //
 // Each point is computed once, and failures are separate from results: also what evaluate() throws, and what is not
 // finite. The best point is kept for any outcome of the solver: feasible before infeasible, then the lower f.
@@ -23,7 +23,6 @@ namespace mbsopt::inline optim {
 class NlpSearch {
  protected:
   static constexpr double kAcceptable = 100;  // times the tolerance: where noise hides the rest
-  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
   // Options: IpoptOptions or NloptOptions, which outlive the search. Evaluations are counted into the result.
   template <class Options>
@@ -57,11 +56,9 @@ class NlpSearch {
   void take_solution();
 
   void end_refused();  // at the start
-  void end_optimal();
-  void end_start_optimal();
-  void end_infeasible();
-  // The search has settled at this distance. It converged if noise may hide the rest; NaN: it did not.
-  void end_settled(double distance, const std::string& why);
+  // Takes the solution and judges it by feasibility and optimality alone, whichever method found it and however that
+  // ended. why: the reason in words if it is not optimal.
+  void conclude(const std::string& why);
 
   NonlinearProgram& problem_;
   NlpResult& result_;

@@ -59,36 +59,6 @@ TEST_CASE("NLopt's methods without gradients ask for none", "[nlopt]") {
   CHECK(result.evaluations == problem.values);
 }
 
-TEST_CASE("NLopt: where separable models creep along a valley slsqp goes on, and that is said", "[nlopt]") {
-  struct Valley : Counted {
-    explicit Valley(double steep) : Counted(2, 0), steepness(steep) { x_lower.setConstant(-5), x_upper.setConstant(5); }
-    double f(const Eigen::VectorXd& x) const override {
-      return 10 + steepness * std::pow(x(0) - x(1), 2) + std::pow(x(0) + x(1) - 2, 2);
-    }
-    Eigen::VectorXd f_x(const Eigen::VectorXd& x) const override {
-      const double a = 2 * steepness * (x(0) - x(1)), b = 2 * (x(0) + x(1) - 2);
-      return vector({a + b, b - a});
-    }
-    double steepness;
-  };
-  const std::string method = GENERATE("mma", "ccsaq");
-  INFO(method);
-  NloptOptions options = with(method, 1e-6);
-  options.max_evaluations = 400;
-  Valley narrow(1e6), wide(1);
-  const NlpResult result = solve_with_nlopt(narrow, vector({0.5, 0.4}), options);
-  INFO(result.message << " " << result.evaluations << " " << result.algorithm);
-  CHECK(result.status == SolverStatus::converged);
-  CHECK((result.x - vector({1, 1})).norm() < 1e-5);
-  CHECK_THAT(result.message, Contains(method + " had hardly gained") && Contains("slsqp went on"));
-  CHECK_THAT(result.algorithm, Contains("from evaluation") && Contains("SQP"));
-  CHECK(narrow.most_often() == 1);
-  const NlpResult alone = solve_with_nlopt(wide, vector({0.5, 0.4}), options);
-  CHECK(alone.status == SolverStatus::converged);
-  CHECK_THAT(alone.message, !Contains("slsqp"));
-  CHECK_THAT(alone.algorithm, !Contains("SQP"));
-}
-
 TEST_CASE("global methods leave the valley of the start, local ones end in it", "[nlopt]") {
   Camel problem;
   const auto start = vector({1.6, 0.55});  // near a local minimum, f = 2.1
