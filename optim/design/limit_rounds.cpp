@@ -100,26 +100,50 @@ SearchHooks continued(const SearchHooks& hooks, int iterations) {
   return later;
 }
 
+// One search more, from x, with what the optimiser may still spend; none if that is nothing. Counts those before, too.
+std::optional<NlpResult> searched_again(DesignProgram& program, const Eigen::VectorXd& x_start, bool warm,
+                                        const SearchHooks& hooks, const NlpResult& done, DesignResult& result) {
+  OptimizerSpec rest = remaining(program.spec().optimizer, done);
+  if (!may_go_on(rest)) return std::nullopt;
+  rest.warm_start = warm || rest.warm_start;
+  NlpResult found = solved_once(program, x_start, rest, continued(hooks, done.iterations), result);
+  found.iterations += done.iterations;
+  found.evaluations += done.evaluations;
+  found.failed_evaluations += done.failed_evaluations;
+  return found;
+}
+
+// A search that stalls with the curvature that it has learnt may go on without it.
+NlpResult solved(DesignProgram& program, const SearchHooks& hooks, DesignResult& result) {
+  constexpr int kFreshStarts = 2;
+  NlpResult solution = solved_once(program, program.x_start(), program.spec().optimizer, hooks, result);
+  for (int k = 0; k < kFreshStarts && solution.status == SolverStatus::no_progress; ++k) {
+    std::optional<NlpResult> found = searched_again(program, solution.x, true, hooks, solution, result);
+    if (!found) break;
+    if (!is_an_improvement(program, *found, solution)) {
+      solution.take_counts(*found);
+      if (found->status == SolverStatus::stopped) solution.end_on_request();
+      break;
+    }
+    solution = *std::move(found);
+  }
+  return solution;
+}
+
 // Solves again within the moved bounds, from the last solution. If the method stalls there, it solves from the first
 // start.
 void solve_again(DesignProgram& program, const SearchHooks& hooks, NlpResult& solution, DesignResult& result) {
   for (const bool from_solution : {true, false}) {
-    OptimizerSpec rest = remaining(program.spec().optimizer, solution);
-    if (!may_go_on(rest)) {
+    const Eigen::VectorXd& x_start = from_solution ? solution.x : program.x_start();
+    std::optional<NlpResult> found = searched_again(program, x_start, from_solution, hooks, solution, result);
+    if (!found)
       return solution.end(
           SolverStatus::iteration_limit,
           "stopped at the limit of iterations or evaluations, before the limits held for true extremes");
-    }
-    rest.warm_start = from_solution || rest.warm_start;
-    NlpResult found = solved_once(program, from_solution ? solution.x : program.x_start(), rest,
-                                  continued(hooks, solution.iterations), result);
-    const bool is_worse = !from_solution && !is_an_improvement(program, found, solution);
-    found.iterations += solution.iterations, found.evaluations += solution.evaluations;
-    found.failed_evaluations += solution.failed_evaluations;
-    if (is_worse)
-      solution.take_counts(found);
+    if (from_solution || is_an_improvement(program, *found, solution))
+      solution = *std::move(found);
     else
-      solution = std::move(found);
+      solution.take_counts(*found);
     if (solution.status != SolverStatus::no_progress && solution.status != SolverStatus::infeasible) return;
   }
 }
@@ -144,7 +168,7 @@ LimitedSolution solve_in_rounds(DesignProgram& program, const SearchHooks& hooks
   TrueLimits limits(program);
   LimitedSolution rounds;
   NlpResult& solution = rounds.solution;
-  solution = solved_once(program, program.x_start(), optimizer, hooks, result);
+  solution = solved(program, hooks, result);
   while (solution.point.ok && !hooks.abandoned()) {
     rounds.true_values = program.evaluator().true_values(program.rho_at(solution.x));
     if (!is_an_end(solution.status)) break;
