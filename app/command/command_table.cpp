@@ -95,8 +95,6 @@ void identify_options(CLI::App& sub, CommandOptions& options) {
   sub.add_option("--bootstrap", options.bootstrap,
                  "bootstrap intervals: number of records with resampled residuals to fit")
       ->check(CLI::Range(2, 1'000'000));
-  sub.add_option("--compare", options.compare, "another problem file: which model explains the data better")
-      ->type_name("FILE.json");
   add_keep_journal(sub, options);
 }
 

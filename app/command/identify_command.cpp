@@ -17,7 +17,6 @@
 #include "app/starts/identify_starts.hpp"
 #include "app/starts/json_records.hpp"
 #include "app/starts/multistart.hpp"
-#include "app/starts/other_model.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
@@ -105,8 +104,8 @@ Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& 
   return recovery;
 }
 
-// Recovers, draws again and compares a converged fit, as the command line requests.
-void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, const std::optional<OtherModel>& other) {
+// Recovers and draws again a converged fit, as the command line requests.
+void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit) {
   const CommandOptions& options = run.context.options;
   if (options.recover > 0 && !interrupted()) {
     show_recovery(run, recovered(run, cut, fit, false));
@@ -114,7 +113,6 @@ void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, c
   if (options.bootstrap > 0 && !interrupted()) {
     show_bootstrap(run, fit, recovered(run, cut, fit, true));
   }
-  if (other && !interrupted()) other->compare(run, fit, simulating(run));
 }
 
 // Residuals at the initial values, whose derivatives are doubted on the way; for --preflight with what the data
@@ -234,8 +232,6 @@ int identify_command(const CommandContext& context) {
   if (!run.problem.identification) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
-  std::optional<OtherModel> other;
-  if (!context.options.compare.empty()) other.emplace(context);
   std::vector<std::string> moved;
   const std::vector<CsvTable> whole = data_of(run.problem, &moved);
   for (const std::string& words : moved) {
@@ -267,7 +263,6 @@ int identify_command(const CommandContext& context) {
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   const IdentificationResult start = at_start(run, needed, data);
-  if (other) other->check(run, simulating(run));
   say_channels(run, needed, data, start);
   if (context.options.preflight) return preflight(run, start);
   LongRun long_run(run);
@@ -288,7 +283,7 @@ int identify_command(const CommandContext& context) {
   run.write("history.csv", to_csv(history));
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
-  if (fit.ok()) examine(run, cut, fit, other);
+  if (fit.ok()) examine(run, cut, fit);
   const Problem explained = with_fitted_values(needed, fit);
   std::optional<SimulatedExperiment> after;
   if (!interrupted() && before.simulation.ok()) after = simulated_experiment(run, simulated_scene(explained, data));
@@ -297,7 +292,6 @@ int identify_command(const CommandContext& context) {
     long_run.stopped(fmt::format("optimized.json holds the {} so far", kept));
   } else if (!fit.ok()) {
     long_run.failed(fit.status, fit.message);
-    if (other) run.warn("--compare: is skipped, since the fit did not converge");
   }
   if (after && after->simulation.ok()) {
     page.heading("Motion of the first experiment");

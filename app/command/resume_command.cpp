@@ -52,7 +52,6 @@ int resume_command(const CommandContext& context) {
   };
   options.problem_file = from_here("input");
   if (!options.sweep.points.empty()) options.sweep.points = from_here("points");
-  if (!options.compare.empty()) options.compare = from_here("compare");
   options.allow_plugins = context.options.allow_plugins;  // a folder of somebody else's must not decide it
   options.out = folder.string();
   options.resume = true;

@@ -28,7 +28,6 @@ struct CommandOptions {
   bool preflight = false;             // --preflight of identify: no fit
   int recover = 0;                    // --recover of identify: fits of simulated records
   int bootstrap = 0;                  // --bootstrap of identify: fits of resampled residuals
-  std::string compare;                // --compare of identify: another problem file
   double budget = 60;                 // --budget of tradeoff [s]
   std::string alpha;                  // --alpha of tradeoff: the penalty study
   std::optional<double> apply;        // --apply of tradeoff: the accuracy wanted

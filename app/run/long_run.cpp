@@ -25,9 +25,8 @@ Json header_of(const Run& run, const Json& seeds) {
               {"input", provenance["input"]},
               {"input_sha256", provenance["input_sha256"]},
               {"seeds", seeds}};
-  for (const auto& [key, file] :
-       {std::pair{"points", context.options.sweep.points}, {"compare", context.options.compare}})
-    if (!file.empty()) header[key] = std::filesystem::relative(file, run.folder.path()).generic_string();
+  if (const std::string& points = context.options.sweep.points; !points.empty())
+    header["points"] = std::filesystem::relative(points, run.folder.path()).generic_string();
   if (provenance.contains("data_sha256")) header["data_sha256"] = provenance["data_sha256"];
   return header;
 }

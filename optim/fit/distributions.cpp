@@ -1,7 +1,6 @@
 #include "optim/fit/distributions.hpp"
 
 #include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 
@@ -16,7 +15,6 @@ namespace {
 // In double precision throughout: long double takes half of the compile time and adds nothing here.
 using Double = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
 using ChiSquared = boost::math::chi_squared_distribution<double, Double>;
-using FisherF = boost::math::fisher_f_distribution<double, Double>;
 using Normal = boost::math::normal_distribution<double, Double>;
 using StudentsT = boost::math::students_t_distribution<double, Double>;
 
@@ -35,6 +33,5 @@ double chi_squared_tail(double degrees_of_freedom, double x) {
   return cdf(complement(ChiSquared(degrees_of_freedom), x));
 }
 double normal_tail(double x) { return cdf(complement(Normal(), x)); }
-double f_tail(double degrees1, double degrees2, double x) { return cdf(complement(FisherF(degrees1, degrees2), x)); }
 
 }  // namespace mbsopt::inline optim

@@ -10,6 +10,5 @@ double chi_squared_quantile(double degrees_of_freedom, double probability);
 // The probability of a value above x.
 double chi_squared_tail(double degrees_of_freedom, double x);
 double normal_tail(double x);
-double f_tail(double degrees1, double degrees2, double x);  // of the F distribution
 
 }  // namespace mbsopt::inline optim

@@ -279,50 +279,6 @@ TEST_CASE("identify: the first row of the history holds the gradient of the star
   CHECK(gradient > 0.01 * cost);
 }
 
-TEST_CASE("identify --compare: the other file is checked before the fit, and found again by resume", "[command]") {
-  const TemporaryFolder folder;
-  folder.write("swing.csv", measured_swing(folder));
-  const std::string file = folder.write("fit.json", identification_problem());
-  std::string held = identification_problem();
-  held.replace(held.find("\"L\": {\"value\": 1"), 16, "\"L\": {\"value\": 1.01");
-  const std::string other = folder.write("other.json", held);
-  const auto compared = [&](const std::string& with, const std::string& out) {
-    return run_command({"identify", file, "--compare", with, "--out", folder.file(out), "--keep-journal"});
-  };
-  const CommandOutcome good = compared(other, "out");
-  INFO(good.err);
-  REQUIRE(good.exit_code == kDone);
-  // Both problems are named "rod".
-  const auto variants = json_of(folder.path / "out/result.json").at("comparison").at("variants");
-  CHECK(variants.at(0).at("problem") == file);
-  CHECK(variants.at(1).at("problem") == other);
-  CHECK_THAT(content_of(folder.path / "out/journal.jsonl"), Contains("\"compare\":\"../other.json\""));
-
-  // A wrong column is known from the data only.
-  held.replace(held.find("\"column\": \"theta\""), 17, "\"column\": \"tehta\"");
-  const CommandOutcome bad = compared(folder.write("bad.json", held), "bad");
-  CHECK(bad.exit_code == kBadInput);
-  CHECK_THAT(bad.err, Contains("bad.json:") && Contains("identification.experiments[0].channels[0].column"));
-  CHECK_THAT(bad.err, !Contains("fit.json"));
-  CHECK_THAT(bad.out, !Contains("std error"));
-
-  // Windows are cut by what the data hold.
-  held = identification_problem();
-  held.replace(held.find("\"data\": \"swing.csv\""), 19,
-               R"("data": "swing.csv", "windows": {"length": 0.5, "continuity": true}, "free": ["L"])");
-  const CommandOutcome cut = compared(folder.write("cut.json", held), "cut");
-  INFO(cut.err);
-  CHECK(cut.exit_code == kBadInput);
-  CHECK_THAT(cut.err,
-             Contains("cut.json:") && Contains("experiments[0].windows.continuity: needs a start that is free"));
-  CHECK_THAT(cut.err, !Contains("fit.json"));
-  CHECK_THAT(cut.out, !Contains("std error"));
-
-  const CommandOutcome skipped = run_command({"identify", file, "--compare", other, "--preflight", "--set",
-                                              "identification.optimizer.tolerance=1e-9", "--out", folder.file("pre")});
-  CHECK_THAT(skipped.err, Contains("--compare: is skipped by --preflight") && Contains("--set does not change"));
-}
-
 TEST_CASE("identify --preflight does not replace the result of a fit", "[command]") {
   const TemporaryFolder folder;
   folder.write("swing.csv", measured_swing(folder));
