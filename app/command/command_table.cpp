@@ -48,7 +48,6 @@ void problem_options(CLI::App& sub, CommandOptions& options) {
 void kinematics_options(CLI::App& sub, CommandOptions& options) {
   problem_options(sub, options);
   sub.add_flag("--mat", options.mat, "also write trajectory.mat: the columns of trajectory.csv as vectors for MATLAB");
-  sub.add_flag("--gnuplot", options.gnuplot, "also write trajectory.gp, a gnuplot script that plots trajectory.csv");
 }
 
 void simulate_options(CLI::App& sub, CommandOptions& options) {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "app/results/joint_forces.hpp"
-#include "app/results/trajectory_exports.hpp"
+#include "app/results/trajectory_mat.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -143,7 +143,6 @@ void write_trajectory(Run& run, const Trajectory& trajectory, const std::vector<
   if (!text) return run.stopped("trajectory.csv was not written");
   run.write("trajectory.csv", *text);
   if (run.context.options.mat) run.write("trajectory.mat", to_mat(trajectory));
-  if (run.context.options.gnuplot) run.write("trajectory.gp", gnuplot_script(run.problem.scene));
 }
 
 void require_sensitivities(const Scene& scene) {

@@ -22,8 +22,8 @@ struct SimulatedMotion {
 // Draws the progress of `run`, and stops if the user interrupts.
 SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho);
 
-// Writes trajectory.csv into the folder of the run; with --mat and --gnuplot also trajectory.mat and trajectory.gp.
-// Warns of each column with empty cells. Ctrl-C stops the run without the files.
+// Writes trajectory.csv into the folder of the run, with --mat also trajectory.mat. Warns of each column with empty
+// cells. Ctrl-C stops the run without the files.
 void write_trajectory(Run& run, const Trajectory& trajectory, const std::vector<SingularPosition>& singular);
 
 // Throws std::invalid_argument if the scene has no sensors or no parameters.

@@ -36,7 +36,6 @@ struct CommandOptions {
   std::vector<std::string> outputs;   // --outputs of linearise: sensors; empty: all
   SweepOptions sweep;                 // --vary, --samples, --seed, --points, --gradients of sweep
   bool mat = false;                   // --mat of simulate and kinematics: trajectory.mat
-  bool gnuplot = false;               // --gnuplot of these: trajectory.gp
   bool sensitivities = false;         // --sensitivities of simulate: sensitivities.csv
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet

@@ -1,4 +1,4 @@
-#include "app/results/trajectory_exports.hpp"
+#include "app/results/trajectory_mat.hpp"
 
 #include <matio.h>
 
@@ -6,7 +6,8 @@
 #include <cmath>
 #include <memory>
 
-#include "tests/app/temporary_folder.hpp"
+#include "app/terminal/exit_code.hpp"
+#include "tests/app/run_command.hpp"
 
 using namespace mbsopt;
 
@@ -54,4 +55,15 @@ TEST_CASE("names of columns become names of MATLAB, each once", "[results]") {
   CHECK(mat_names({"rod.x", "rod_x", "1st", "_a", "über", longest, longest}) ==
         std::vector<std::string>{"rod_x", "rod_x_2", "x1st", "x_a", "x__ber", std::string(63, 'a'),
                                  std::string(61, 'a') + "_2"});
+}
+
+TEST_CASE("simulate --mat writes trajectory.mat beside trajectory.csv", "[results]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  REQUIRE(run_command({"simulate", file, "--out", folder.file("plain")}).exit_code == kDone);
+  CHECK_FALSE(std::filesystem::exists(folder.path / "plain/trajectory.mat"));
+  const CommandOutcome outcome = run_command({"simulate", file, "--mat", "--out", folder.file("out")});
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.out, Catch::Contains("trajectory.csv trajectory.mat"));
+  CHECK_THAT(content_of(folder.path / "out/trajectory.mat"), Catch::StartsWith("MATLAB 5.0 MAT-file"));
 }

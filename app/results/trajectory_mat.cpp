@@ -1,14 +1,9 @@
-#include "app/results/trajectory_exports.hpp"
-
-#include <fmt/format.h>
+#include "app/results/trajectory_mat.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <set>
-
-#include "app/results/objective_units.hpp"
 
 namespace mbsopt::inline app {
 namespace {
@@ -42,13 +37,6 @@ std::string vector_element(const std::string& name, const std::string& values, s
   append_element(element, kInt8, name);
   append_element(element, kDouble, values);
   return element;
-}
-
-// Inside single quotes gnuplot reads '' as one quote, and all other characters literally.
-std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("''") : std::string(1, c);
-  return result + "'";
 }
 
 }  // namespace
@@ -89,35 +77,6 @@ std::string to_mat(const Trajectory& trajectory) {
     append_element(bytes, kMatrix, vector_element(names[k], values, trajectory.rows.size()));
   }
   return bytes;
-}
-
-std::string gnuplot_script(const Scene& scene) {
-  const std::size_t kColumnsOfBody = 13, panels = scene.sensors.size() + scene.bodies.size();
-  const auto rows = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(panels))));
-  std::string script = fmt::format(
-      "# gnuplot -persist trajectory.gp, in this folder; as a file:\n"
-      "# gnuplot -e \"set terminal pdfcairo size 30cm,20cm; set output 'trajectory.pdf'\" trajectory.gp\n"
-      "set termoption noenhanced\n"
-      "set datafile separator comma\n"
-      "set xlabel 't [s]'\n"
-      "set grid\n"
-      "set multiplot layout {},{} title {}\n",
-      rows, (panels + rows - 1) / rows, quoted(scene.name));
-  std::size_t column = 2 + kColumnsOfBody * scene.bodies.size();  // gnuplot counts from 1, and t is the first
-  for (const Sensor& sensor : scene.sensors) {
-    const std::string unit = unit_in(scene, sensor);
-    script += fmt::format("set ylabel {}\nplot 'trajectory.csv' skip 1 using 1:{} with lines notitle\n",
-                          quoted(unit.empty() ? sensor.name : fmt::format("{} [{}]", sensor.name, unit)), column++);
-  }
-  column = 2;
-  for (const Body& body : scene.bodies) {
-    script += fmt::format(
-        "set ylabel {}\nplot 'trajectory.csv' skip 1 using 1:{} with lines title 'x', "
-        "'' skip 1 using 1:{} with lines title 'y', '' skip 1 using 1:{} with lines title 'z'\n",
-        quoted(body.name + " [m]"), column, column + 1, column + 2);
-    column += kColumnsOfBody;
-  }
-  return script + "unset multiplot\n";
 }
 
 }  // namespace mbsopt::inline app

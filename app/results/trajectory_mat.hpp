@@ -1,4 +1,4 @@
-// The motion for other programs.
+// The motion for MATLAB.
 #pragma once
 
 #include <string>
@@ -17,8 +17,5 @@ std::vector<std::string> mat_names(const std::vector<std::string>& columns);
 // A MAT-file of level 5, uncompressed (The MathWorks, "MAT-File Format"). The library libmatio writes the same, but it
 // needs HDF5 and 30 more shared libraries, which double the time that the program takes to start.
 std::string to_mat(const Trajectory& trajectory);
-
-// trajectory.gp: a gnuplot script that plots each sensor of trajectory.csv, and the position of each body.
-std::string gnuplot_script(const Scene& scene);
 
 }  // namespace mbsopt::inline app
