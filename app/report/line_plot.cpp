@@ -100,8 +100,7 @@ PlotFrame frame_of(const LinePlot& plot) {
   }
   const bool has_marks = std::ranges::any_of(
       plot.series, [](const PlotSeries& series) { return is_cloud(series) || series.mark == Mark::bars; });
-  const bool wide = plot.logarithmic_x || !plot.x_names.empty();
-  frame.x.finish(wide ? 0.05 : has_marks ? kAirOfMarks : 0);
+  frame.x.finish(plot.logarithmic_x ? 0.05 : has_marks ? kAirOfMarks : 0);
   frame.y.finish(0.05);
   return frame;
 }
@@ -291,17 +290,9 @@ Ticks ticks_of(const AxisRange& range, bool logarithmic, int count, bool whole =
   return ticks;
 }
 
-Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
-  if (plot.x_names.empty()) return ticks_of(frame.x, plot.logarithmic_x, 8, plot.whole_x);
-  Ticks names;
-  for (const std::string& name : plot.x_names)
-    names.emplace_back(static_cast<double>(names.size()), html_escaped(name));
-  return names;
-}
-
 std::string axes_of(const LinePlot& plot, const PlotFrame& frame) {
   std::string ticks;
-  for (const auto& [tick, label] : x_ticks_of(plot, frame))
+  for (const auto& [tick, label] : ticks_of(frame.x, plot.logarithmic_x, 8, plot.whole_x))
     ticks += fmt::format("<line x1=\"{0}\" x2=\"{0}\" y2=\"100%\"/><text x=\"{0}\" y=\"100%\" dy=\"16\">{1}</text>\n",
                          percent(frame.right(tick)), label);
   for (const auto& [tick, label] : ticks_of(frame.y, plot.logarithmic_y, 6))
@@ -393,7 +384,6 @@ std::string plot_data(const LinePlot& plot) {
                     {"y", {frame.y.high, frame.y.low}},
                     {"log", {{"x", plot.logarithmic_x}, {"y", plot.logarithmic_y}}},
                     {"whole", plot.whole_x},
-                    {"names", plot.x_names},
                     {"series", series}});
 }
 

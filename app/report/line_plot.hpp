@@ -50,7 +50,6 @@ struct LinePlot {
   bool whole_x = false;        // x counts: ticks at whole numbers only
   std::vector<PlotLimit> limits = {};
   std::vector<PlotInstant> instants = {};
-  std::vector<std::string> x_names = {};  // instead of numbers at x = 0, 1, 2, ...
 };
 
 inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of the page

@@ -176,34 +176,6 @@ void add_convergence(RunPage& page, const Trajectory& history, const std::string
     if (!plot.series.empty() && plot.series.size() <= kMostCurves) page.plot(plot);
 }
 
-// Parallel coordinates: a line through the parameters of each start, each between its bounds.
-LinePlot parallel_coordinates(const Scene& scene, const Json& multistart, const Json& parameters) {
-  constexpr std::size_t kMost = 60;  // lines of one plot
-  LinePlot plot{.title = "Where the starts ended", .x_label = "parameter", .y_label = kBetween};
-  std::vector<Between> bounds;
-  for (const auto& [name, p] : parameters.items()) {
-    const std::optional<Between> between = bounds_of(scene, name, p);
-    if (between) plot.x_names.push_back(name), bounds.push_back(*between);
-  }
-  const std::size_t best = multistart.at("at_the_best_optimum").get<std::size_t>();
-  std::optional<std::size_t> first_other;  // the series that stands for all other optima
-  for (const Json& record : multistart.at("waterfall")) {
-    if (plot.series.size() == kMost || !record.contains("parameters") || !record.value("objective", Json()).is_number())
-      continue;
-    const bool is_best = plot.series.size() < std::max<std::size_t>(best, 1);
-    PlotSeries series{is_best ? (best > 0 ? "the best optimum" : "the best end") : "other ends", {}, {}, Mark::line};
-    if (is_best && !plot.series.empty()) series.part_of = 0;
-    if (!is_best && first_other) series.part_of = first_other;
-    if (!is_best && !first_other) first_other = plot.series.size();
-    for (std::size_t k = 0; k < bounds.size(); ++k) {
-      series.x.push_back(static_cast<double>(k));
-      series.y.push_back(bounds[k](number_of(record.at("parameters"), plot.x_names[k])));
-    }
-    plot.series.push_back(std::move(series));
-  }
-  return plot;
-}
-
 // The starts of an identification compare sums of squares in sigma.
 std::string minimised_unit(const Json& result) {
   const Json objectives = result.value("objectives", Json::object());
@@ -248,14 +220,14 @@ void add_multistart(RunPage& page) {
   }
   plot.logarithmic_y = all_positive(series.y);
   if (!series.y.empty()) page.plot(plot);
-  const LinePlot ends =
-      parallel_coordinates(page.run.problem.scene, multistart, result.value("parameters", Json::object()));
-  if (ends.series.size() > 1 && ends.x_names.size() > 1) page.plot(ends);
-  page.table(table_of(multistart.at("waterfall"), {{"start", "start"},
-                                                   {"objective", "objective", 6},
-                                                   {"infeasibility", "infeasibility", 2},
-                                                   {"optimality", "optimality", 2},
-                                                   {"outcome", "message"}}));
+  std::vector<Column> columns{{"start", "start"},
+                              {"objective", "objective", 6},
+                              {"infeasibility", "infeasibility", 2},
+                              {"optimality", "optimality", 2},
+                              {"outcome", "status"}};
+  const Json parameters = result.value("parameters", Json::object());  // items() refers to it
+  for (const auto& [name, p] : parameters.items()) columns.push_back({name, "parameters/" + name, 5, true});
+  page.table(table_of(multistart.at("waterfall"), columns));
   const Json& optima = multistart.at("optima");
   if (optima.empty()) return;
   page.paragraph(fmt::format("Distinct optima: {}.", optima.size()));

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 #include <tuple>
 
@@ -32,42 +31,25 @@ std::tuple<int, double, double, int> rank(const Json& record) {
   return {1, violation, objective, number_of(record)};
 }
 
-std::string text_of(const Json& record, const std::string& key) {
-  if (!record.contains(key) || record[key].is_null()) return "-";
-  if (record[key].is_string()) return record[key].get<std::string>();
-  return record[key].is_number_integer() ? std::to_string(record[key].get<long>())
-                                         : significant(record[key].get<double>());
+// Prints a table of the first rows.
+void print_first(std::ostream& out, const Json& rows, const std::vector<Column>& columns) {
+  const Json first(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(std::min(kPrinted, rows.size())));
+  out << '\n' << table_of(first, columns).text();
+  if (rows.size() > kPrinted) out << fmt::format("... and {} more, in result.json\n", rows.size() - kPrinted);
 }
 
-// Prints a table of the first ones.
-template <class Row>
-void print_first(std::ostream& out, TextTable table, std::size_t count, const Row& row) {
-  for (std::size_t i = 0; i < std::min(kPrinted, count); ++i) {
-    const std::vector<std::string> cells = row(i);
-    table.add({cells.begin(), cells.end()});
-  }
-  out << '\n' << table.text();
-  if (count > kPrinted) out << fmt::format("... and {} more, in result.json\n", count - kPrinted);
-}
-
-void print_waterfall(std::ostream& out, const std::vector<Json>& ranked) {
-  const std::array columns{"start", "status", "objective", "infeasibility", "iterations", "evaluations"};
-  std::vector<std::string> header{"rank"}, parameters;
-  header.insert(header.end(), columns.begin(), columns.end());
-  if (!ranked.empty() && ranked[0].contains("parameters"))
-    for (const auto& [name, value] : ranked[0]["parameters"].items()) parameters.push_back(name);
-  header.insert(header.end(), parameters.begin(), parameters.end());
-  print_first(out, TextTable(header), ranked.size(), [&](std::size_t i) {
-    std::vector<std::string> row{std::to_string(i + 1)};
-    for (const char* column : columns) row.push_back(text_of(ranked[i], column));
-    for (const std::string& name : parameters)
-      row.push_back(text_of(ranked[i].value("parameters", Json::object()), name));
-    return row;
-  });
+void print_waterfall(std::ostream& out, const Json& waterfall) {
+  std::vector<Column> columns{{"rank"}};
+  for (const char* key : {"start", "status", "objective", "infeasibility", "iterations", "evaluations"})
+    columns.push_back({key, key});
+  if (!waterfall.empty() && waterfall[0].contains("parameters"))
+    for (const auto& [name, value] : waterfall[0]["parameters"].items())
+      columns.push_back({name, "parameters/" + name});
+  print_first(out, waterfall, columns);
 }
 
 // Adds the distinct optima to the result, and prints them.
-void tell_optima(Run& run, const std::vector<DistinctOptimum>& optima, bool all_found) {
+void add_optima(Run& run, const std::vector<DistinctOptimum>& optima, bool all_found) {
   const SearchedOptima found = searched(optima);
   Json& result = run.result["multistart"];
   result["optima"] = Json::array();
@@ -81,10 +63,8 @@ void tell_optima(Run& run, const std::vector<DistinctOptimum>& optima, bool all_
   result["all_found"] = all_found;
   if (optima.empty()) return;
   std::ostream& out = run.context.out;
-  print_first(out, TextTable({"optimum", "found by", "first start", "objective"}), optima.size(), [&](std::size_t i) {
-    return std::vector{std::to_string(i + 1), counted(optima[i].starts, "start"), text_of(*optima[i].best, "start"),
-                       text_of(*optima[i].best, "objective")};
-  });
+  print_first(out, result["optima"],
+              {{"optimum"}, {"found by starts", "found_by"}, {"best start", "start"}, {"objective", "objective"}});
   out << fmt::format("{} in {} that converged", counted(found.optima, "optimum", "optima"),
                      counted(found.searches, "search", "searches"));
   if (found.expected())
@@ -107,7 +87,7 @@ bool compute_batches(LongRun& long_run, const MultistartSpec& spec, const StartW
   const auto done = [&](const Json& record) {
     outcome.ranked.push_back(record);
     run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", number_of(record),
-                                       text_of(record, "status"), text_of(record, "objective"), outcome.ranked.size(),
+                                       cell(record.at("status")), cell(record.at("objective")), outcome.ranked.size(),
                                        spec.starts));
   };
   const auto show = [&] { run.progress.fraction("starts", static_cast<double>(outcome.ranked.size()) / spec.starts); };
@@ -126,7 +106,7 @@ bool compute_batches(LongRun& long_run, const MultistartSpec& spec, const StartW
   return ends;
 }
 
-void tell_starts(Run& run, const MultistartSpec& spec, const MultistartOutcome& outcome) {
+void add_starts(Run& run, const MultistartSpec& spec, const MultistartOutcome& outcome) {
   const Json* const best = outcome.best();
   const long same = best && is_an_optimum(*best)
                         ? std::ranges::count_if(outcome.ranked,
@@ -144,13 +124,14 @@ void tell_starts(Run& run, const MultistartSpec& spec, const MultistartOutcome& 
             {"best", best ? Json(number_of(*best)) : Json()},
             {"at_the_best_optimum", same}};
   for (const Json& record : outcome.ranked) result["waterfall"].push_back(without_recorded(record));
-  print_waterfall(run.context.out, outcome.ranked);
+  print_waterfall(run.context.out, result.value("waterfall", Json::array()));
   run.context.out << starts_in_words(result) << '\n';
   const auto ended = [&](const char* optimum) {
     return std::ranges::count_if(outcome.ranked, [&](const Json& r) { return r.value("optimum", "") == optimum; });
   };
   if (const long inside = ended("interior"), beside = ended("boundary"); inside + beside > 0) {
-    result["optima_inside"] = inside, result["optima_at_boundary"] = beside;
+    result["optima_inside"] = inside;
+    result["optima_at_boundary"] = beside;
     run.context.out << fmt::format("{} end in an optimum: {} inside, {} at a bound or a limit\n", inside + beside,
                                    inside, beside);
   }
@@ -196,8 +177,8 @@ MultistartOutcome run_multistart(LongRun& long_run, const MultistartSpec& spec, 
     outcome.simulations += record.value("simulations", 0L);
     outcome.wall_seconds += record.value("wall_seconds", 0.0);
   }
-  tell_starts(run, spec, outcome);
-  tell_optima(run, distinct_optima(outcome.ranked, run.problem.scene), all_found);
+  add_starts(run, spec, outcome);
+  add_optima(run, distinct_optima(outcome.ranked, run.problem.scene), all_found);
   return outcome;
 }
 

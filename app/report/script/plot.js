@@ -203,8 +203,7 @@ class Plot {
   draw_ticks(width) {
     this.ticks.replaceChildren();
     const add = (line, place, words) => this.ticks.append(svg("line", line), svg("text", place, words));
-    const names = this.plot.names.map((name, k) => [k, [name]]);
-    for (const [v, words] of names.length ? names : this.labelled("x", Math.min(Math.max(width / 75, 2), 8))) {
+    for (const [v, words] of this.labelled("x", Math.min(Math.max(width / 75, 2), 8))) {
       const share = this.from_axis("x", v), x = this.place("x", share);
       if (this.plot.whole && v != Math.round(v) || share < this.view.x[0] || share > this.view.x[1]) continue;
       add({x1: x, x2: x, y2: "100%"}, {x, y: "100%", dy: 16}, words);
@@ -230,7 +229,7 @@ class Plot {
       const i = s.sorted ? nearest(s.x, x) : this.closest(s, pointer || [x, 0.5]);
       if (!words.length && !this.over_time) at = s.x[i];
       const value = this.value("x", s.x[i]);
-      const place = this.over_time ? "" : ` (${this.plot.names[value] ?? shown(value)})`;
+      const place = this.over_time ? "" : ` (${shown(value)})`;
       words.push((s.name || "value") + place + " = " + shown(this.value("y", s.y[i])));
     }
     set(this.line, {x1: this.place("x", at), x2: this.place("x", at)});
