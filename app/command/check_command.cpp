@@ -44,7 +44,11 @@ std::string compared(std::string_view verdict, double difference) {
   return has_size ? fmt::format("{} {:.1e}", verdict, difference) : std::string(verdict);
 }
 
-// All derivatives of each objective, and how they compare.
+constexpr std::size_t kMostLadders = 60;  // plots of a page that stays below 400 kB
+
+std::string ladder_id(std::size_t pair) { return fmt::format("ladder-{}", pair); }  // for links
+
+// All derivatives of each objective, and how they compare. A comparison with differences links to their plot.
 void show_entries(RunPage& page, bool discrete) {
   const Json& result = page.run.result;
   std::ostream& out = page.run.context.out;
@@ -53,6 +57,7 @@ void show_entries(RunPage& page, bool discrete) {
                      "Relative to tlm:\n"
                    : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
                      "frozen. Relative to tlm:\n");
+  std::size_t pair = 0;
   for (const auto& [objective, entries] : result.at("verdict").at("entries").items()) {
     TextTable table(
         {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
@@ -67,6 +72,8 @@ void show_entries(RunPage& page, bool discrete) {
       for (const auto& [verdict, difference] :
            {std::pair{"exact", "tlm_adjoint"}, {"frozen", "frozen_difference"}, {"free", "free_difference"}})
         row.push_back(compared(cell(entry.at(verdict)), number_of(entry, difference)));
+      if (pair < kMostLadders) row[6].link = row[7].link = "#" + ladder_id(pair);
+      ++pair;
     }
     const std::string value = objective_line(objective, result["objectives"][objective]);
     out << '\n' << value << table.text();
@@ -87,24 +94,12 @@ void print_taylor(std::ostream& out, const GradientCheck& check) {
   }
 }
 
-std::string weighted_sum(const GradientCheck& check, const Eigen::VectorXd& w) {
-  std::string text;
-  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
-    const double weight = w(static_cast<Eigen::Index>(i));
-    const char* sign = weight < 0 ? "-" : "+";
-    if (!text.empty()) text += fmt::format(" {} {:.3g} {}", sign, std::abs(weight), check.objectives[i]);
-    if (text.empty()) text = fmt::format("{:.3g} {}", weight, check.objectives[i]);
-  }
-  return text;
-}
-
 void print_identities(std::ostream& out, const GradientCheck& check) {
   if (check.identities.empty()) return;
   out << "\nadjoint identity w'(psi_rho d) by tlm = (psi_rho'w)'d by adjoint, d random in all parameters, w random:\n";
-  for (const IdentityCheck& identity : check.identities) {
-    out << fmt::format("  of {}: {:.6g}, defect {:.1e} of its terms: {}\n", weighted_sum(check, identity.w),
-                       identity.adjoint, identity.relative_defect, identity.passed ? "agrees" : "DISAGREES");
-  }
+  for (const IdentityCheck& identity : check.identities)
+    out << fmt::format("  {:.6g}, defect {:.1e} of its terms: {}\n", identity.adjoint, identity.relative_defect,
+                       identity.passed ? "agrees" : "DISAGREES");
 }
 
 // The worst entry of each objective; all of them are in result.json.
@@ -235,15 +230,11 @@ LinePlot ladder_plot(const std::string& objective, const std::string& unit, cons
   return plot;
 }
 
-constexpr std::size_t kMostLadders = 60;  // plots of a page that stays below 400 kB
-
 // The entry of result["verdict"]["entries"] for one objective and one parameter.
 struct CheckedPair {
   std::string objective, parameter;
   const Json& entry;
 };
-
-std::string ladder_id(std::size_t pair) { return fmt::format("ladder-{}", pair); }  // for links
 
 void add_ladders(RunPage& page, const std::vector<CheckedPair>& pairs) {
   const Scene& scene = page.run.problem.scene;
@@ -286,31 +277,6 @@ void add_taylor(RunPage& page) {
   page.plot(plot);
 }
 
-// The number of equal digits of two numbers, from their relative difference.
-void add_digits(HtmlPage& page, const std::vector<CheckedPair>& pairs, const char* difference,
-                const std::string& title) {
-  constexpr double kDouble = 16;  // digits of a double
-  std::vector<std::string> header{"objective"};
-  std::vector<TableRow> rows;
-  bool any = false;
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const auto& [objective, parameter, entry] = pairs[k];
-    if (rows.empty() || rows.back().front().text != objective) rows.push_back({objective});
-    if (rows.size() == 1) header.push_back(parameter);
-    TableCell& shown = rows.back().emplace_back("-");
-    const double found = number_of(entry, difference);
-    if (std::isnan(found)) continue;
-    const double digits = std::clamp(-std::log10(std::max(found, 1e-300)), 0.0, kDouble);
-    any = true;
-    shown = TableCell(fmt::format("{:.0f}", digits), cell(found, 3));
-    shown.shade = digits / kDouble;
-    if (k < kMostLadders) shown.link = "#" + ladder_id(k);
-  }
-  if (!any) return;
-  page.paragraph(title);
-  page.table(header, rows);
-}
-
 std::string worst(const std::vector<CheckedPair>& pairs, const char* difference) {
   double largest = 0;
   for (const CheckedPair& pair : pairs)
@@ -319,8 +285,8 @@ std::string worst(const std::vector<CheckedPair>& pairs, const char* difference)
   return fmt::format("{:.1e}", largest);
 }
 
-// The comparison as colours and curves.
-void add_plots(RunPage& page) {
+// The comparison in a sentence, as tables and as curves.
+void show_comparison(RunPage& page, bool discrete) {
   const Json& verdict = page.run.result.at("verdict");
   std::vector<CheckedPair> pairs;
   for (const auto& [objective, parameters] : verdict.at("entries").items())
@@ -330,13 +296,7 @@ void add_plots(RunPage& page) {
                   "on free steps by {} of an entry.",
                   verdict.at("passed").get<bool>() ? "All gradients agree" : "Gradients disagree",
                   worst(pairs, "tlm_adjoint"), worst(pairs, "frozen_difference"), worst(pairs, "free_difference")));
-  page.heading("Digits that agree");
-  page.note(
-      "A stronger colour means more agreeing digits, 16 at most. The pointer shows the relative difference; a click "
-      "shows the differences over their step.");
-  add_digits(page, pairs, "tlm_adjoint", "Tangent-linear model and adjoint:");
-  add_digits(page, pairs, "frozen_difference", "Tangent-linear model and differences on frozen steps:");
-  add_digits(page, pairs, "free_difference", "Tangent-linear model and differences with step-size control:");
+  show_entries(page, discrete);
   add_ladders(page, pairs);
   add_taylor(page);
 }
@@ -379,8 +339,7 @@ int check_command(const CommandContext& context) {
   print_simulation(context.out, scene, check.statistics);
   warn_of_stiffness(run, check.statistics, true);
   RunPage page(run);
-  add_plots(page);
-  show_entries(page, check.discrete);
+  show_comparison(page, check.discrete);
   print_taylor(context.out, check);
   print_identities(context.out, check);
   print_continuous(context.out, check);

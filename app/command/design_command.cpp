@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "app/report/motion_plots.hpp"
-#include "app/report/row_plot.hpp"
 #include "app/report/run_page.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/objective_units.hpp"
@@ -92,7 +91,7 @@ void add_verdict(RunPage& page, const DesignResult& design) {
   page.verdict(fmt::format("{}; {} of {} at a bound.", words, at_bounds, counted(design.variables.size(), "variable")));
 }
 
-// The parameters at both ends of the search. The page draws them between their bounds, too.
+// The parameters at both ends of the search; the page has their bounds, too.
 void add_parameters(RunPage& page, const DesignResult& design) {
   const Json& parameters = page.run.result.at("parameters");
   const char* const end = end_of_search(to_string(design.status));
@@ -101,22 +100,6 @@ void add_parameters(RunPage& page, const DesignResult& design) {
   page.print(table_of(parameters, columns));
   columns.insert(columns.begin() + 4, {{"lower", "lower"}, {"upper", "upper"}});
   page.table(table_of(parameters, columns));
-  RowPlot plot{.title = fmt::format("Variables between their bounds (ring: start, dot: {})", end),
-               .x_label = kBetween,
-               .range = std::pair(-0.03, 1.03),
-               .track = true};
-  for (const auto& [name, p] : parameters.items()) {
-    const std::optional<Between> between = bounds_of(page.run.problem.scene, name, p);
-    if (!between) continue;
-    const double from = (*between)(p.at("initial").get<double>()), to = (*between)(p.at("value").get<double>());
-    plot.rows.push_back({.name = name,
-                         .low = from,
-                         .high = to,
-                         .ring = from,
-                         .dot = to,
-                         .words = cell(p.at("initial"), 4) + " \u2192 " + cell(p.at("value"), 4) + after_number(p)});
-  }
-  page.drawing(to_svg(plot));
 }
 
 // effort is the text of effort() in multistart.hpp, or the seconds.

@@ -34,13 +34,12 @@ struct RowAxis {
 };
 
 // The bars of a row have the height of report.css [px]: their middle is at 13, thin lines lie above it.
-std::string bars_of(const RowPlot& plot, const PlotRow& row, const RowAxis& axis) {
+std::string bars_of(const PlotRow& row, const RowAxis& axis) {
   const auto bar = [&](const char* style, double from, double to, int top, int bottom) {
     return fmt::format("<line class=\"{}\" x1=\"{}\" x2=\"{}\" y1=\"{}\" y2=\"{}\"/>", style, axis.percent(from),
                        axis.percent(to), top, bottom);
   };
   std::string svg;
-  if (plot.track) svg += bar("track", -INFINITY, INFINITY, 13, 13);
   svg += bar(row.high < row.low ? "thick c1" : "thick c0", row.low, row.high, 13, 13);
   if (row.prior) svg += bar("line c1", row.prior->first, row.prior->second, 5, 5);
   for (const double bound : row.bounds)
@@ -65,7 +64,7 @@ std::string to_svg(const RowPlot& plot) {
   for (const PlotRow& row : plot.rows) {
     const std::string name = html_escaped(row.name), words = html_escaped(row.words);
     figure += fmt::format("<div title=\"{0}: {1}\"><span>{0}</span><svg>{2}{3}</svg><span>{1}</span></div>\n", name,
-                          words, grid, bars_of(plot, row, axis));
+                          words, grid, bars_of(row, axis));
   }
   return figure + fmt::format("<div><svg>{}<text x=\"50%\" y=\"34\">{}</text></svg></div></figure>\n", labels,
                               html_escaped(plot.x_label));

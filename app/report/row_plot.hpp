@@ -27,7 +27,6 @@ struct RowPlot {
   std::string title, x_label;
   std::vector<PlotRow> rows = {};
   std::optional<std::pair<double, double>> range = {};  // else that of the bars; what is outside ends at the edge
-  bool track = false;                                   // a grey bar over the whole range, beneath
 };
 
 // Returns an empty string without rows.
