@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <tuple>
 #include <utility>
 
 #include "app/report/identification_page.hpp"
@@ -15,7 +17,6 @@
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
 #include "app/starts/identify_starts.hpp"
-#include "app/starts/json_records.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
@@ -25,6 +26,7 @@
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
 #include "optim/fit/experiment.hpp"
+#include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/fit_start.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/profile_likelihood.hpp"
@@ -51,21 +53,40 @@ std::function<bool(double t)> fit_progress(Run& run) {
   };
 }
 
-// Fits and simulations with these options keep no records.
 IdentificationOptions simulating(Run& run) {
   IdentificationOptions options;
   options.threads = case_threads(run), options.simulation_progress = fit_progress(run);
   return options;
 }
 
+// Residuals at points of the fit, which statistics and profiles ask for again.
+class KnownResiduals : public ResidualRecords {
+ public:
+  bool recall(const Asked& asked, Experiment::Residuals& found) override {
+    const auto known = known_.find(key_of(asked));
+    if (known != known_.end()) found = known->second;
+    return known != known_.end();
+  }
+  void record(const Asked& asked, const Experiment::Residuals& found) override {
+    constexpr Eigen::Index kMostNumbers = 50'000;  // more would fill the memory
+    if (found.z.size() + found.z_u.size() <= kMostNumbers) known_[key_of(asked)] = found;
+  }
+
+ private:
+  using Key = std::tuple<std::size_t, std::vector<double>, std::vector<double>>;
+  static Key key_of(const Asked& asked) { return {asked.experiment, entries_of(asked.u), asked.sigma}; }
+
+  std::map<Key, Experiment::Residuals> known_;
+};
+
 // given is the problem of the file, cut into windows.
 IdentificationResult fitted(LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data,
                             const Problem& given) {
   Run& run = long_run.run;
-  JsonRecords records(long_run.earlier().records,
-                      [&](const std::string& kind, const Json& content) { long_run.add(kind, content); });
   IdentificationOptions options;
-  options.records = &records, options.threads = case_threads(run);
+  KnownResiduals known;
+  options.records = &known;
+  options.threads = case_threads(run);
   options.profiles = run.context.options.profiles;
   options.simulation_progress = fit_progress(run);
   options.progress = [&](const FitRow& row) {

@@ -64,7 +64,7 @@ void add_objective(Sweep& sweep, const Problem& problem, const ObjectiveSpec& sp
 }
 
 // The columns of the result. Points that were not computed have none.
-Sweep sweep_of(const Problem& problem, const SweepPoints& points, const std::vector<SweepRow>& rows, bool gradients) {
+Sweep sweep_of(const Problem& problem, const SweepPoints& points, const std::vector<Json>& rows, bool gradients) {
   Sweep sweep;
   sweep.table.columns = {"point"};
   for (const int p : points.parameters) {
@@ -75,19 +75,18 @@ Sweep sweep_of(const Problem& problem, const SweepPoints& points, const std::vec
   for (const ObjectiveSpec& spec : problem.objectives)
     add_objective(sweep, problem, spec, shown_unit(units, spec.name), gradients);
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (!rows[i].done) continue;
+    if (rows[i].is_null()) continue;
     Point& point = sweep.table.rows.emplace_back(Point{static_cast<double>(i + 1)});
     point.insert(point.end(), points.values[i].begin(), points.values[i].end());
     point.resize(sweep.table.columns.size(), std::numeric_limits<double>::quiet_NaN());
-    if (rows[i].psi.size() == 0) continue;
+    if (rows[i].contains("failed")) continue;
     for (std::size_t o = 0; o < sweep.objectives.size(); ++o) {
-      const auto row = static_cast<Eigen::Index>(o);
       const SweptObjective& objective = sweep.objectives[o];
-      point[objective.value] = rows[i].psi(row);
-      if (objective.judged != objective.value && rows[i].true_values[o])
-        point[objective.judged] = *rows[i].true_values[o];
+      point[objective.value] = rows[i]["psi"][o].get<double>();
+      if (objective.judged != objective.value && rows[i]["true"][o].is_number())
+        point[objective.judged] = rows[i]["true"][o].get<double>();
       for (std::size_t p = 0; gradients && p < sweep.varied.size(); ++p)
-        point[objective.judged + 1 + p] = rows[i].psi_rho(row, static_cast<Eigen::Index>(p));
+        point[objective.judged + 1 + p] = rows[i]["psi_rho"][o][p].get<double>();
     }
   }
   const std::size_t ranked = sweep.objectives[sweep.best_by].judged;
@@ -240,9 +239,10 @@ int sweep_command(const CommandContext& context) {
   run.start();
   if (!settle_accuracy(run)) return run.finish();
   long_run.begin();
-  const std::vector<SweepRow> rows = swept(long_run, points, seed);
-  const auto done = std::ranges::count_if(rows, &SweepRow::done);
-  const auto failed = std::ranges::count_if(rows, [](const SweepRow& row) { return !row.message.empty(); });
+  const std::vector<Json> rows = swept(long_run, points, seed);
+  const auto is_failed = [](const Json& row) { return row.contains("failed"); };
+  const auto done = std::ranges::count_if(rows, [](const Json& row) { return !row.is_null(); });
+  const auto failed = std::ranges::count_if(rows, is_failed);
   run.result["sweep"] = {{"points", rows.size()}, {"computed", done}, {"failed", failed}};
   if (options.samples) run.result["sweep"]["seed"] = seed;
   RunPage page(run);
@@ -250,9 +250,9 @@ int sweep_command(const CommandContext& context) {
   add_verdict(page, sweep, rows.size());
   add_ranges(page, sweep, rows.size());
   if (failed > 0) {
-    const auto first = std::ranges::find_if(rows, [](const SweepRow& row) { return !row.message.empty(); });
+    const auto first = std::ranges::find_if(rows, is_failed);
     run.warn(fmt::format("{} of {} points have no values, the first is point {}: {}", failed, rows.size(),
-                         first - rows.begin() + 1, first->message));
+                         first - rows.begin() + 1, first->at("failed").get<std::string>()));
   }
   run.write("sweep.csv", to_csv(sweep.table));
   if (interrupted())

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <new>
 #include <random>
 #include <utility>
 
@@ -19,21 +18,14 @@
 namespace mbsopt::inline app {
 namespace {
 
-constexpr int kJournalVersion = 5;
+constexpr int kJournalVersion = 6;
 constexpr std::string_view kSealBegin = ",\"sha256\":\"", kSealEnd = "\"}";
 constexpr std::size_t kSealSize = 64;  // of SHA-256 in hex
-// The interval between flushes of evaluations. A flush takes up to 10 ms (measured: 8 ms on ext4 of a virtual disk), so
-// flushes take at most a tenth of the time.
-constexpr std::chrono::milliseconds kFlushInterval{100};
 
-bool is_evaluation(std::string_view kind) { return kind == "point" || kind == "hessians" || kind == "residuals"; }
-
-// The line of a record, with its end. Moves the journal's end behind it.
+// The line of a record, with its checksum. Moves the journal's end behind it.
 std::string sealed(const Json& record, JournalEnd& end) {
   std::string text = json_text(record);
   text.pop_back();  // the closing bracket
-  text += fmt::format(",\"run\":\"{}\"", end.run);
-  text += fmt::format(",\"bytes\":{}", text.size());
   end.seal = sha256_of(end.seal + text);
   text += fmt::format("{}{}{}\n", kSealBegin, end.seal, kSealEnd);
   end.bytes += text.size();
@@ -79,8 +71,8 @@ void refuse_foreign(const std::filesystem::path& file) {
 // Begins a journal with its first line.
 JournalEnd begun(const std::filesystem::path& file, const Json& header) {
   refuse_foreign(file);
-  JournalEnd end{drawn_run_id(), {}};
-  Json first{{"journal", kJournalVersion}};
+  JournalEnd end;
+  Json first{{"journal", kJournalVersion}, {"run", drawn_run_id()}};
   first.update(header);
   write_file_atomically(file, sealed(first, end));
   return end;
@@ -115,7 +107,7 @@ JournalContent read_journal(const std::filesystem::path& folder) {
           "line {} is damaged, or not of this run: its checksum does not fit; {}", number,
           number == 1 ? "start the run anew" : "remove this line and all after it, and 'resume' continues from there"));
     if (number == 1)
-      content.header = record, last.run = record.at("run").get<std::string>();
+      content.header = record;
     else
       content.records[record.begin().key()].push_back(record.begin().value());
   }
@@ -127,16 +119,6 @@ const std::vector<Json>& JournalContent::of(const std::string& kind) const {
   static const std::vector<Json> none;
   const auto found = records.find(kind);
   return found == records.end() ? none : found->second;
-}
-
-void read_record(const std::function<void()>& read) {
-  try {
-    read();
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception&) {
-    throw OutputError(std::string(kJournalFile) + ": a record does not have the form that this version writes");
-  }
 }
 
 Journal::Journal(const std::filesystem::path& folder, const Json& header)
@@ -152,26 +134,12 @@ Journal::Journal(const std::filesystem::path& folder, JournalEnd end)
   throw WriteError(path_, "cannot be cut to its last whole line");
 }
 
-Journal::~Journal() {
-  flush();
-  ::close(descriptor_);
-}
-
-bool Journal::flush() {
-  if (!is_flushed_ && ::fdatasync(descriptor_) != 0) return false;
-  is_flushed_ = true, flushed_at_ = std::chrono::steady_clock::now();
-  return true;
-}
+Journal::~Journal() { ::close(descriptor_); }
 
 void Journal::add(const std::string& kind, const Json& content) {
   JournalEnd end = end_;
   const std::string line = sealed(Json{{kind, content}}, end);
-  const auto is_due = [&] {
-    return !is_evaluation(kind) || std::chrono::steady_clock::now() - flushed_at_ >= kFlushInterval;
-  };
-  const bool written = write_all(descriptor_, line);
-  is_flushed_ = false;
-  if (!written || (is_due() && !flush())) {
+  if (!write_all(descriptor_, line) || ::fdatasync(descriptor_) != 0) {
     const int why = errno;
     [[maybe_unused]] const int cut =
         ::ftruncate(descriptor_, static_cast<off_t>(end_.bytes));  // else a reader drops it

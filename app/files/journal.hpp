@@ -1,28 +1,21 @@
-// journal.jsonl of an output folder: the progress of a long run, a line of JSON each, appended at once. The kernel
-// keeps an appended line when the run is killed. A flush to the disk protects lines when the machine stops: evaluations
-// at most every 100 ms, other lines at once.
+// journal.jsonl of an output folder: what a long run has finished, a line of JSON each. A line is appended and flushed
+// to the disk at once, so that it survives the end of the run and of the machine.
 //
-//   {"journal": 5, "command": "design", "input": "../five_bar.json", ...}    the first line: what is run, and on what
-//   {"point": {"x": [...], "f": 0.12, "f_x": [...], ...}}                    an evaluation   (json_records.hpp)
-//   {"hessians": {...}}                                                      second derivatives
-//   {"residuals": {...}}                                                     an experiment   (json_records.hpp)
+//   {"journal": 6, "run": "52bd...", "command": "design", ...}               the first line: what is run, and on what
 //   {"iterate": {"iteration": 3, "objective": ..., "parameters": {...}}}     accepted by the optimiser
 //   {"start": {"start": 7, "status": "converged", ...}}                      a start, or a block of a sweep
 //   {"ended": "ok"}                                                          the status of result.json, which exists
 //
-// So a line is a kind with its content. It ends with
-//   "run": "52bd...", "bytes": 310, "sha256": "9f86..."
-// the run's id, the number of bytes before "sha256", and the checksum of these after the checksum of the line before.
-// So the reader finds a line that is damaged, missing, moved or of another run. It ignores a truncated last line.
+// So a line is a kind with its content. It ends with "sha256": "9f86...", the checksum of the line before this key
+// after the checksum of the line before. So the reader finds a line that is damaged, missing, moved or of another run.
+// It ignores a truncated last line.
 //
-// A resumed run repeats everything from the first line, but takes from the journal what it contains. So it ends with
-// the same result, bit by bit.
+// A resumed run takes finished starts from the journal and computes the others. Solvers are deterministic, and seeds
+// are in the first line. So it ends with the same result, bit by bit.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -35,15 +28,13 @@ inline constexpr const char* kJournalFile = "journal.jsonl";
 
 // Where the next line goes.
 struct JournalEnd {
-  std::string run, seal;  // the run's id; the last checksum
+  std::string seal;       // the last checksum
   std::size_t bytes = 0;  // of whole lines
 };
 
-using JournalRecords = std::map<std::string, std::vector<Json>>;  // contents of lines by kind, in their order
-
 struct JournalContent {
-  Json header = Json::object();  // the first line
-  JournalRecords records;        // of the others
+  Json header = Json::object();                      // the first line
+  std::map<std::string, std::vector<Json>> records;  // contents of the others by kind, in their order
   JournalEnd end;
 
   const std::vector<Json>& of(const std::string& kind) const;
@@ -52,16 +43,13 @@ struct JournalContent {
 // Throws OutputError if there is no journal, or if it has another version or is damaged.
 JournalContent read_journal(const std::filesystem::path& folder);
 
-// Reads a record's content. It turns exceptions, from a library or a wrong size, into an OutputError.
-void read_record(const std::function<void()>& read);
-
 class Journal {
  public:
   // Replaces the journal of an earlier run. Throws OutputError if a file that is no journal has its name.
   Journal(const std::filesystem::path& folder, const Json& header);
   // Continues the journal of this end, and removes its truncated last line.
   Journal(const std::filesystem::path& folder, JournalEnd end);
-  ~Journal();  // flushes
+  ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
@@ -69,13 +57,9 @@ class Journal {
   bool exists() const;                                     // false where its file was deleted meanwhile
 
  private:
-  bool flush();
-
   std::filesystem::path path_;
   JournalEnd end_;
   int descriptor_ = -1;
-  bool is_flushed_ = true;
-  std::chrono::steady_clock::time_point flushed_at_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace mbsopt::inline app

@@ -22,8 +22,5 @@ std::string json_text(const Json& json, int indent = -1);
 // The numbers of a vector and the rows of a matrix. Their text reads back as the same numbers.
 std::vector<double> entries_of(const Eigen::VectorXd& v);
 Json rows_of(const Eigen::MatrixXd& m);
-// The same vector and matrix. A matrix of another size is a std::length_error.
-Eigen::VectorXd vector_in(const Json& json);
-Eigen::MatrixXd matrix_in(const Json& json, Eigen::Index rows, Eigen::Index columns);
 
 }  // namespace mbsopt::inline app

@@ -86,9 +86,13 @@ void LongRun::add_iterate(const Json& iterate) {
   if (before.empty() || iterate.at("iteration") > before.back().at("iteration")) add("iterate", iterate);
 }
 
+// A run without starts has no finished parts.
 std::string LongRun::how_to_continue() const {
   if (!journal_->exists()) return "the journal was deleted during the run, so nothing can be resumed";
-  return fmt::format("'mbsopt resume {}' continues", run.folder.path().string());
+  const Problem& problem = run.problem;
+  const bool is_single = (run.context.command == "design" && !problem.design->multistart) ||
+                         (run.context.command == "identify" && !problem.identification->multistart);
+  return fmt::format("'mbsopt resume {}' {}", run.folder.path().string(), is_single ? "repeats the run" : "continues");
 }
 
 void LongRun::stopped(const std::string& kept) {

@@ -7,14 +7,11 @@
 
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/starts/distinct_optima.hpp"
-#include "app/starts/json_records.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/objective/case_objective.hpp"
 #include "optim/objective/evaluator.hpp"
-#include "optim/problem/load_cases.hpp"
 #include "optim/problem/start_points.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 
@@ -40,10 +37,7 @@ Problem with_seeds(Problem problem, LongRun& long_run) {
 
 DesignResult single_run(LongRun& long_run, const Problem& problem) {
   Run& run = long_run.run;
-  JsonRecords records(long_run.earlier().records,
-                      [&](const std::string& kind, const Json& content) { long_run.add(kind, content); });
   DesignOptions options;
-  options.records = &records;
   options.threads = case_threads(run);
   options.simulation_progress = run.watched("simulating");
   options.progress = [&](const DesignRow& row) {
@@ -76,12 +70,9 @@ std::optional<int> mode_of(int run, const std::optional<int>& modes) {
   return modes ? std::optional(run % *modes) : std::nullopt;
 }
 
-// Runs in a worker process from one start. The record holds its evaluations, from which the best run is repeated.
+// Runs in a worker process from one start.
 Json record_of_start(const Problem& problem, const NlpScale& scale, std::optional<int> mode, int start) {
-  JournalRecords evaluations;
-  JsonRecords records({}, [&](const std::string& kind, const Json& content) { evaluations[kind].push_back(content); });
   DesignOptions options;
-  options.records = &records;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [](const DesignRow&) { return !interrupted(); };
   options.scale = scale, options.mode = mode;
@@ -104,35 +95,29 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
   if (design.closing_steps > 0) record["closing_steps"] = design.closing_steps;
   for (const DesignVariable& v : design.variables)
     record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
-  if (is_an_optimum(record)) {
-    Problem reached = with_values(problem, record["parameters"]);
-    if (design.mode && !design.mode->bodies.empty()) reached.scene.bodies = design.mode->bodies;
-    for (const Problem& of_case : problems_of_cases(reached)) record["motion"].push_back(motion_of(of_case.scene));
-  }
-  constexpr double kLong = 2e-3;  // [s] per point; a shorter one is sooner computed again than written and read
-  const bool is_long = design.status == SolverStatus::stopped ||  // only its points lead to the same end again
-                       design.wall_seconds > kLong * static_cast<double>(evaluations["point"].size());
-  record["recorded"] = is_long ? evaluations : JournalRecords();
   return record;
 }
 
-// Repeats the run of a record from its evaluations. A start that ended is repeated to its end, whatever interrupts. A
-// start that was stopped ends after its points. If it has none (TrackedSquares), it ends at the iterate of the record.
-DesignResult told_again(const Problem& problem, const NlpScale& scale, std::optional<int> mode, const Json& record) {
-  auto evaluations = record.at("recorded").get<JournalRecords>();
-  JsonRecords records(evaluations, [](const std::string&, const Json&) {});
-  const bool stopped = record.at("status").get<std::string>() == to_string(SolverStatus::stopped);
-  const bool unrecorded = evaluations["point"].empty();
-  DesignOptions options;
-  options.records = &records;
-  options.simulation_progress = [&](double) { return !stopped || unrecorded || !records.all_points_recalled(); };
+// The result of the best start, whose record holds only its end. Its run is repeated. After an interrupt there is no
+// time for that: then its end is evaluated. Only the run knows the poses of an assembly mode, so it is repeated up to
+// its end there, too; it is solved, not integrated, and takes a moment.
+DesignResult result_of_best(Run& run, const Problem& problem, DesignOptions options, const Json& record) {
+  options.simulation_progress = run.watched("repeating the best start");
+  options.progress = [](const DesignRow&) { return !interrupted(); };
+  if (!interrupted()) {
+    DesignResult repeated = run_design(problem, options);
+    if (!interrupted()) return repeated;
+  }
+  const bool in_mode = options.mode.has_value();
+  options.simulation_progress = {};
   options.progress = [&](const DesignRow& row) {
-    const Json reached = by_name(problem.design->variables, row.parameters);
-    return !stopped || (unrecorded ? reached != record.at("parameters") : !records.all_points_recalled());
+    return in_mode && by_name(problem.design->variables, row.parameters) != record.at("parameters");
   };
-  options.scale = scale, options.mode = mode;
-  options.compare_differences = !interrupted();
-  return run_design(problem, options);
+  options.compare_differences = false;
+  DesignResult end = run_design(in_mode ? problem : with_values(problem, record.at("parameters")), options);
+  for (DesignVariable& v : end.variables) v.value = record.at("parameters").at(v.name).get<double>();
+  end.objective_final = record.at("objective").get<double>();
+  return end;
 }
 
 void describe_given_cases(const Problem& problem, DesignResult& design) {
@@ -205,12 +190,15 @@ DesignOutcome best_of_starts(LongRun& long_run, const Problem& seeded, const Eig
   result.interrupted = outcome.interrupted;
   if (best) {
     const int start = (*best)["start"].get<int>();
-    result.design = told_again(from(start), scale, mode_of(start, modes), *best);
+    DesignOptions options;
+    options.scale = scale;
+    options.mode = mode_of(start, modes);
+    result.design = result_of_best(long_run.run, from(start), options, *best);
     describe_given(problem, before, result.design);
   } else {
     result.design = run_design(from(0), until_interrupted);
   }
-  // The best run is repeated from its points, which is no further search.
+  // The repeated run is no further search.
   result.design.simulations = outcome.simulations, result.design.wall_seconds = outcome.wall_seconds;
   return result;
 }
@@ -223,7 +211,9 @@ StartWork design_start_work(Problem problem, const Json& task) {
   problem.design->multistart->seed = task.at("seed").get<long>();
   if (task.contains("sharpness")) problem.design->sharpness = task["sharpness"].get<double>();
   if (task.contains("optimizer_seed")) problem.design->optimizer.seed = task["optimizer_seed"].get<long>();
-  const NlpScale scale{task.at("scale").at("f").get<double>(), vector_in(task["scale"].at("c"))};
+  const auto c = task.at("scale").at("c").get<std::vector<double>>();
+  const NlpScale scale{task["scale"].at("f").get<double>(),
+                       Eigen::Map<const Eigen::VectorXd>(c.data(), static_cast<Eigen::Index>(c.size()))};
   std::optional<int> modes;
   if (task.contains("modes")) modes = task["modes"].get<int>();
   return {task, [from = starts_of(problem, modes.value_or(1)), scale, modes](int start) {

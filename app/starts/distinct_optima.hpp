@@ -23,13 +23,8 @@ inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: 
 // Returns whether a start converged with all limits held.
 bool is_an_optimum(const Json& record);
 
-// The motion at some instants: origins and axes of the bodies, forces of the joints; null if there is none. A record
-// has that of each load case as its "motion".
-Json motion_of(const Scene& scene);
-
 // Returns whether two optima agree within 1e-3 of the range of each bounded parameter, or of its logarithm if that is
-// the scale. Other parameters are the same design, too, if they lead to the same motion by the same forces: angles that
-// differ by whole turns do.
+// the scale. Angles (parameters with the unit rad) may differ by whole turns if the objectives are the same.
 bool same_optimum(const Json& a, const Json& b, const Scene& scene);
 
 struct DistinctOptimum {

@@ -73,13 +73,6 @@ void add_optima(Run& run, const std::vector<DistinctOptimum>& optima, bool all_f
   out << '\n';
 }
 
-Json without_recorded(const Json& record) {
-  Json short_record = Json::object();
-  for (const auto& [key, value] : record.items())
-    if (key != "recorded" && key != "motion") short_record[key] = value;
-  return short_record;
-}
-
 // Returns whether the search ended because it had found all optima (spec.until_all_found).
 bool compute_batches(LongRun& long_run, const MultistartSpec& spec, const StartWork& work, MultistartOutcome& outcome) {
   Run& run = long_run.run;
@@ -123,7 +116,7 @@ void add_starts(Run& run, const MultistartSpec& spec, const MultistartOutcome& o
             {"wall_seconds", outcome.wall_seconds},
             {"best", best ? Json(number_of(*best)) : Json()},
             {"at_the_best_optimum", same}};
-  for (const Json& record : outcome.ranked) result["waterfall"].push_back(without_recorded(record));
+  for (const Json& record : outcome.ranked) result["waterfall"].push_back(record);
   print_waterfall(run.context.out, result.value("waterfall", Json::array()));
   run.context.out << starts_in_words(result) << '\n';
   const auto ended = [&](const char* optimum) {
@@ -144,12 +137,9 @@ const Json* MultistartOutcome::best() const {
 }
 
 std::string effort(const Run& run, long simulations, double wall_seconds) {
-  std::string of;
-  if (run.result.contains("multistart"))
-    of = " in " + counted_starts(run.result["multistart"]);
-  else if (run.context.options.resume)
-    of = " since it was resumed";
-  return fmt::format("{}, {:.3g} s{}", counted(simulations, "simulation"), wall_seconds, of);
+  const bool several = run.result.contains("multistart");
+  return fmt::format("{}, {:.3g} s{}", counted(simulations, "simulation"), wall_seconds,
+                     several ? " in " + counted_starts(run.result["multistart"]) : "");
 }
 
 std::vector<Parameter> parameters_of(const Scene& scene, const std::vector<std::string>& names) {

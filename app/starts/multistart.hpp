@@ -4,8 +4,8 @@
 //   {"start": 7, "status": "converged", "message": "...", "objective": 0.12, "infeasibility": 0, "iterations": 9,
 //    "evaluations": 12, "simulations": 14, "wall_seconds": 0.8, "from": {"k1": 100}, "parameters": {"k1": 87}}
 //
-// The journal, but not result.json, keeps further entries. Results do not depend on the number of workers. The content
-// of the records ranks them, and the number of the start decides ties.
+// Results do not depend on the number of workers. The content of the records ranks them, and the number of the start
+// decides ties.
 #pragma once
 
 #include <optional>

@@ -97,9 +97,7 @@ bool compute_starts(LongRun& long_run, int first, int last, const StartWork& wor
                     const std::function<void(const Json& record)>& done, const std::function<void()>& waiting) {
   Run& run = long_run.run;
   std::set<int> finished;
-  read_record([&] {
-    for (const Json& record : long_run.earlier().of("start")) finished.insert(record.at("start").get<int>());
-  });
+  for (const Json& record : long_run.earlier().of("start")) finished.insert(record.at("start").get<int>());
   std::vector<int> starts;
   for (int start = first; start < last; ++start)
     if (!finished.contains(start)) starts.push_back(start);

@@ -42,21 +42,6 @@ Json to_json(const Evaluation& e, const std::vector<std::optional<double>>& true
   return row;
 }
 
-SweepRow row_of(const Json& json) {
-  SweepRow row;
-  row.done = true;
-  if (json.contains("failed")) {
-    row.message = json["failed"].get<std::string>();
-    return row;
-  }
-  row.psi = vector_in(json.at("psi"));
-  for (const Json& value : json.at("true"))
-    row.true_values.push_back(value.is_null() ? std::nullopt : std::optional(value.get<double>()));
-  if (json.contains("psi_rho"))
-    row.psi_rho = matrix_in(json["psi_rho"], row.psi.size(), static_cast<Eigen::Index>(json["psi_rho"].at(0).size()));
-  return row;
-}
-
 // Runs in a worker process. An interrupt ends the block: it is "stopped", with the rows until then.
 Json record_of_block(const Problem& problem, const SweepPoints& points, bool gradients, int block) {
   std::vector<std::string> varied;
@@ -83,9 +68,9 @@ Json record_of_block(const Problem& problem, const SweepPoints& points, bool gra
 
 }  // namespace
 
-std::vector<SweepRow> swept(LongRun& long_run, const SweepPoints& points, long seed) {
+std::vector<Json> swept(LongRun& long_run, const SweepPoints& points, long seed) {
   Run& run = long_run.run;
-  std::vector<SweepRow> rows(points.values.size());
+  std::vector<Json> rows(points.values.size());
   const std::size_t size = block_size(rows.size());
   const std::size_t blocks = (rows.size() + size - 1) / size;
   std::size_t done = 0;
@@ -93,11 +78,11 @@ std::vector<SweepRow> swept(LongRun& long_run, const SweepPoints& points, long s
     const std::size_t first = size * record.at("start").get<std::size_t>(), end = std::min(first + size, rows.size());
     ++done;
     if (record.at("status") == "failed")
-      for (std::size_t i = first; i < end; ++i) rows[i] = {true, record.at("message").get<std::string>()};
+      for (std::size_t i = first; i < end; ++i) rows[i]["failed"] = record.at("message");
     std::size_t i = first;
-    for (const Json& row : record.value("rows", Json::array())) rows.at(i++) = row_of(row);
+    for (const Json& row : record.value("rows", Json::array())) rows.at(i++) = row;
   };
-  read_record([&] { std::ranges::for_each(long_run.earlier().of("start"), take); });
+  std::ranges::for_each(long_run.earlier().of("start"), take);
   compute_starts(long_run, 0, static_cast<int>(blocks),
                  sweep_work(run.problem, task_of(run.context.options.sweep, seed)), take,
                  [&] { run.progress.fraction("sweep", static_cast<double>(done) / static_cast<double>(blocks)); });

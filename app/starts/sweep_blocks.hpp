@@ -3,11 +3,10 @@
 //
 //   {"start": 3, "status": "ok", "rows": [{"psi": [0.2, 1.1], "true": [null, 1.2], "psi_rho": [[...], [...]]},
 //                                         {"failed": "why"}]}
+//
+// psi_rho is there if --gradients requests it.
 #pragma once
 
-#include <Eigen/Core>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "app/run/sweep_points.hpp"
@@ -15,16 +14,8 @@
 
 namespace mbsopt::inline app {
 
-struct SweepRow {
-  bool done = false;
-  std::string message;  // why there are no values
-  Eigen::VectorXd psi = {};
-  std::vector<std::optional<double>> true_values = {};
-  Eigen::MatrixXd psi_rho = {};  // empty unless gradients are requested
-};
-
-// Returns a row per point, in their order. The journal gives those of earlier runs.
-std::vector<SweepRow> swept(LongRun& long_run, const SweepPoints& points, long seed);
+// Returns a row per point, in their order, or null if it was not computed. The journal gives those of earlier runs.
+std::vector<Json> swept(LongRun& long_run, const SweepPoints& points, long seed);
 
 // The blocks, from the task of this process or another one.
 StartWork sweep_work(const Problem& problem, const Json& task);

@@ -125,7 +125,7 @@ struct IdentificationOptions {
   bool preflight = false;
   bool tests_angles = true;            // fits again where a column may be in degrees
   int threads = 1;                     // experiments at a time; results do not depend on it
-  ResidualRecords* records = nullptr;  // of an earlier run that this one goes on with; of the fit and its profiles
+  ResidualRecords* records = nullptr;  // of the points that were simulated before
   // After every point of a profile; false ends it there.
   std::function<bool(const std::string& name, double value, double tau)> profile_progress;
 };

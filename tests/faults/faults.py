@@ -459,8 +459,9 @@ class Campaign:
         elif kind == "insert":
             text = text[:at] + self.random.randbytes(self.random.randrange(1, 20)) + text[at:]
         elif kind == "edit":
-            words = [(b'"c":[', b'"c":[0,'), (b'"f":', b'"f":1'), (b"null", b"0"), (b'"x":[', b'"x":[1,'), (b"[]", b"[[]]"),
-                     (b"converged", b"stopped"), (b'"z":[', b'"z":[1,'), (b'"steps":', b'"steps":1')]
+            words = [(b'"objective":', b'"objective":1'), (b'"cost":', b'"cost":1'), (b"null", b"0"),
+                     (b'"iteration":', b'"iteration":1'), (b"converged", b"stopped"), (b"[]", b"[[]]"),
+                     (b'"parameters":{', b'"parameters":{"a":1,')]
             fitting = [pair for pair in words if pair[0] in text] or [(b"{", b"[")]
             text = text.replace(*self.random.choice(fitting), 1)
         else:

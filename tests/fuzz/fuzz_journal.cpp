@@ -9,7 +9,6 @@
 
 #include "app/files/atomic_file.hpp"
 #include "app/files/journal.hpp"
-#include "app/starts/json_records.hpp"
 #include "optim/problem/regular_file.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
@@ -63,26 +62,6 @@ bool is_beginning(const std::vector<Json>& of, const std::vector<Json>& found) {
   return found.size() <= of.size() && std::equal(found.begin(), found.end(), of.begin());
 }
 
-std::vector<double> numbers_of(const Json& asked, const char* key) {
-  const Json numbers = asked.is_object() ? asked.value(key, Json()) : Json();
-  const bool is_list = numbers.is_array() && std::ranges::all_of(numbers, [](const Json& x) { return x.is_number(); });
-  return is_list ? numbers.get<std::vector<double>>() : std::vector<double>();
-}
-
-// Whatever was asked, what is recalled has the sizes that fit, or nothing is recalled.
-void recall_all(JsonRecords& records, const Json& asked) {
-  const std::vector<double> x = numbers_of(asked, "x"), u = numbers_of(asked, "u");
-  const auto vector = [](const std::vector<double>& v) {
-    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
-  };
-  NlpPoint point;
-  for (const Wanted wanted : {Wanted::values, Wanted::derivatives}) records.recall(vector(x), wanted, point);
-  const Eigen::VectorXd unknowns = vector(u);
-  Experiment::Residuals residuals;
-  if (records.recall({0, unknowns, numbers_of(asked, "sigma")}, residuals))
-    expect(residuals.z_u.cols() == unknowns.size(), "residuals of another size", "");
-}
-
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -106,16 +85,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   write(file, damaged);
   refused_in_words(damaged, [&] {
     expect(is_beginning(records, read_journal(folder.path()).of("point")), "a damaged record is read", damaged);
-  });
-  // The records, as if their checksums fitted.
-  JournalRecords of_kinds;
-  for (const Json& line : records)
-    for (const char* kind : {"point", "hessians", "residuals"})
-      if (line.contains(kind)) of_kinds[kind].push_back(line[kind]);
-  refused_in_words(text, [&] {
-    JsonRecords read(of_kinds, [](const std::string&, const Json&) {});
-    for (const Json& point : of_kinds["point"]) recall_all(read, point.at("asked"));
-    for (const Json& residuals : of_kinds["residuals"]) recall_all(read, residuals.at("asked"));
   });
   return 0;
 }
