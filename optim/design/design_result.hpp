@@ -108,7 +108,6 @@ struct DesignOptions {
   std::function<bool(const DesignRow&)> progress;     // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
   bool evaluate_stopped = true;                       // the end point of an abandoned search: a last evaluation
-  PointRecords* records = nullptr;                    // of an earlier run that this one goes on with
   bool compare_differences = true;                    // at the start, difference_comparison.hpp; in the warnings
   // The scale that judges convergence; if absent, about 1 over the objective and its gradient at the start. Runs from
   // several starts share one, so that "converged" means the same of all.

@@ -112,7 +112,7 @@ class SingleDesign {
                                  result_.simulations + simulations()});
       return !options_.progress || options_.progress(result_.history.back());
     };
-    rounds_ = solve_in_rounds(program_, {progress, [this] { return abandoned_.load(); }, options_.records}, result_);
+    rounds_ = solve_in_rounds(program_, {progress, [this] { return abandoned_.load(); }}, result_);
     static_cast<SolverOutcome&>(result_) = rounds_.solution;
     if (abandoned_) result_.end_on_request();
     result_.algorithm = rounds_.solution.algorithm;

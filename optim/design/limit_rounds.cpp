@@ -25,7 +25,6 @@ Options common_options(const OptimizerSpec& spec, const SearchHooks& hooks) {
   solver.max_evaluations = spec.max_evaluations;
   if (spec.lbfgs_history) solver.history = static_cast<decltype(solver.history)>(*spec.lbfgs_history);
   solver.progress = hooks.progress;
-  solver.records = hooks.records;
   return solver;
 }
 
@@ -58,7 +57,7 @@ NlpResult solved_with_nlopt(DesignProgram& program, const Eigen::VectorXd& x_sta
 NlpResult solved_once(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
                       const SearchHooks& hooks, DesignResult& result) {
   if (spec.type == OptimizerSpec::kLeastSquares)
-    return solve_tracked_squares(program, x_start, spec, hooks.progress, hooks.records, result.simulations);
+    return solve_tracked_squares(program, x_start, spec, hooks.progress, result.simulations);
   if (spec.type == "ipopt") return solved_with_ipopt(program, x_start, spec, hooks);
   return solved_with_nlopt(program, x_start, spec, hooks, result.seed);
 }

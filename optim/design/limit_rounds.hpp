@@ -24,7 +24,6 @@ struct LimitedSolution {
 struct SearchHooks {
   std::function<bool(const NlpProgress&)> progress;  // after every iteration; false stops
   std::function<bool()> abandoned;
-  PointRecords* records = nullptr;
 };
 
 // Adds the seed, the rounds and the simulations to the result.

@@ -64,14 +64,14 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
   constexpr int kMostMoves = 5;
   constexpr double kHeld = 1e-6;  // violation of limits: what ranks as feasible
   bool moved = false;
-  DesignOptions unrecorded = options;  // points are known by their scaled variables, whose units the start decides
-  unrecorded.records = nullptr, unrecorded.compare_differences = false;
+  DesignOptions without_comparison = options;
+  without_comparison.compare_differences = false;
   for (int k = 0; k < kMostMoves && may_improve(*problem.design, result); ++k) {
     std::optional<Problem> next = continued(problem, result);
     if (!next) break;
     DesignResult more;
     try {
-      more = single_design(*next, unrecorded);
+      more = single_design(*next, without_comparison);
     } catch (const std::exception&) {  // a singular position, where parameters stand against each other
       break;
     }

@@ -18,9 +18,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-// Records leave out points with more numbers, as those of a fit do: simulating again costs less than a journal of many
-// megabytes.
-constexpr Index kMostNumbers = 50'000;
 constexpr const char* kNoValue =
     "a residual or its derivative is not a number: a tracked weight is negative, or a sensor has no value";
 
@@ -55,31 +52,19 @@ void project_free_instants(const Objective& objective, const std::vector<Objecti
 
 }  // namespace
 
-TrackedSquares::TrackedSquares(const DesignProgram& program, PointRecords* records)
+TrackedSquares::TrackedSquares(const DesignProgram& program)
     : LeastSquaresProblem(program.variables(), mbsopt::residuals(program.evaluator()) + program.constraints()),
       program_(program),
       evaluator_(program.evaluator()),
-      records_(size * (1 + variables()) <= kMostNumbers ? records : nullptr),
       residuals_(size - program.constraints()) {
   x_lower = program.x_lower, x_upper = program.x_upper;
 }
 
 void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
-  NlpPoint known;
-  if (records_ && records_->recall(x, Wanted::derivatives, known) && (!known.ok || known.c.size() == size)) {
-    point.ok = known.ok, point.message = known.message;
-    if (known.ok) point.z = known.c, point.z_x = known.c_x;
-  } else {
-    known = {};
-    simulate(x, point);
-    is_integrated = !is_solved_;
-    if (abandoned_) return;
-    if (point.ok && !(point.z.allFinite() && point.z_x.allFinite())) point.ok = false, point.message = kNoValue;
-    known.ok = point.ok, known.message = point.message;
-    known.f = point.z.head(residuals_).squaredNorm(), known.f_x.setZero(variables());
-    known.c = point.z, known.c_x = point.z_x;
-    if (records_ && !is_solved_) records_->record(x, Wanted::derivatives, known);
-  }
+  simulate(x, point);
+  is_integrated = !is_solved_;
+  if (abandoned_) return;
+  if (point.ok && !(point.z.allFinite() && point.z_x.allFinite())) point.ok = false, point.message = kNoValue;
   without_value_ = without_value_ || point.message == kNoValue;
 }
 
@@ -176,9 +161,8 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
 }
 
 NlpResult solve_tracked_squares(DesignProgram& program, const VectorXd& x_start, const OptimizerSpec& spec,
-                                const std::function<bool(const NlpProgress&)>& progress, PointRecords* records,
-                                long& simulations) {
-  TrackedSquares problem(program, records);
+                                const std::function<bool(const NlpProgress&)>& progress, long& simulations) {
+  TrackedSquares problem(program);
   LeastSquaresOptions options;
   options.tolerance *= spec.tolerance / OptimizerSpec{}.tolerance;  // the default of one is that of the other
   if (spec.max_iterations) options.max_iterations = static_cast<int>(*spec.max_iterations);

@@ -16,9 +16,8 @@ namespace mbsopt::inline optim {
 
 class TrackedSquares : public LeastSquaresProblem {
  public:
-  // records: may be null. A point is recorded as one of constraints c = z, c_x = z_x, but not where the run is solved:
-  // that costs less than its record. Rows: residuals, then limits.
-  explicit TrackedSquares(const DesignProgram& program, PointRecords* records = nullptr);
+  // Rows: residuals, then limits.
+  explicit TrackedSquares(const DesignProgram& program);
 
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
   Eigen::Index residuals() const { return residuals_; }
@@ -42,7 +41,6 @@ class TrackedSquares : public LeastSquaresProblem {
 
   const DesignProgram& program_;
   const Evaluator& evaluator_;  // of the program
-  PointRecords* const records_;
   const Eigen::Index residuals_;
   long simulations_ = 0;
   bool abandoned_ = false, without_value_ = false;
@@ -53,7 +51,6 @@ class TrackedSquares : public LeastSquaresProblem {
 
 // simulations: is added to.
 NlpResult solve_tracked_squares(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
-                                const std::function<bool(const NlpProgress&)>& progress, PointRecords* records,
-                                long& simulations);
+                                const std::function<bool(const NlpProgress&)>& progress, long& simulations);
 
 }  // namespace mbsopt::inline optim

@@ -260,12 +260,7 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   void update_hessians(const Eigen::VectorXd& x) {
     if (hessians_x_.size() > 0 && hessians_x_ == x) return;
     NlpHessians found;
-    bool ok = options_.records && options_.records->recall(x, found);
-    if (!ok) {
-      ok = problem_.hessians(x, found.of);
-      if (ok && options_.records) options_.records->record(x, found);
-    }
-    if (ok) hessians_ = std::move(found);
+    if (problem_.hessians(x, found.of)) hessians_ = std::move(found);
     if (hessians_.of.empty()) {
       const Eigen::Index n = problem_.variables();
       hessians_.of.assign(static_cast<std::size_t>(problem_.constraints()) + 1, Eigen::MatrixXd::Zero(n, n));

@@ -24,7 +24,6 @@ struct IpoptOptions {
   bool second_order = false;                         // Hessians of the program, which must have hessians()
   bool gauss_newton = false;                         // incomplete Hessians; changes of gradients correct them
   std::optional<long> max_evaluations = {};          // tested after every iteration
-  PointRecords* records = nullptr;
   bool warm_start = false;  // the start is near the solution: hardly any barrier, bounds that it touches stay touched
 };
 

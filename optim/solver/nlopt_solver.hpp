@@ -28,7 +28,6 @@ struct NloptOptions {
   unsigned history = 0;                              // pairs of lbfgs and mlsl; 0: NLopt chooses
   std::uint32_t seed = 0;                            // of methods that are random
   std::function<bool(const NlpProgress&)> progress;  // after every iteration; false stops
-  PointRecords* records = nullptr;
 };
 
 // Throws std::invalid_argument with nlopt_refusal(), or if a global method lacks bounds. Never throws because of an

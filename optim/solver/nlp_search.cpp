@@ -69,7 +69,6 @@ const NlpPoint& NlpSearch::at(const Eigen::VectorXd& x_asked, Wanted wanted) {
 
 NlpPoint NlpSearch::computed(Wanted wanted) {
   NlpPoint point;
-  if (records_ && records_->recall(x_, wanted, point)) return point;
   point.c.setZero(problem_.constraints());
   if (wanted == Wanted::derivatives) {
     point.f_x.setZero(x_.size());
@@ -84,7 +83,6 @@ NlpPoint NlpSearch::computed(Wanted wanted) {
   }
   if (point.ok && !is_finite(point, wanted))
     point.ok = false, point.message = "the objective, a constraint or a derivative is not finite";
-  if (records_ && !point.abandoned) records_->record(x_, wanted, point);
   return point;
 }
 

@@ -32,14 +32,13 @@ class NlpSearch {
         tolerance_(options.tolerance),
         constraint_tolerance_(options.constraint_tolerance),
         progress_(options.progress),
-        records_(options.records),
         margin_(std::max(options.tolerance, 10 * options.constraint_tolerance)) {}
 
   // From memory if x was asked for before. Moves x into the bounds first, because methods may leave them by a rounding
   // error. The reference is valid until the next call.
   const NlpPoint& at(const Eigen::VectorXd& x, Wanted wanted);
   const Eigen::VectorXd& x() const { return x_; }  // of the last call, within the bounds
-  bool is_new() const { return is_new_; }          // whether the last call computed (or recalled) a point not in memory
+  bool is_new() const { return is_new_; }          // whether the last call computed a point not in memory
   bool is_best() const { return is_best_; }        // whether that point became the best
   bool feasible(const NlpPoint& point) const { return problem_.violation(point.c) <= constraint_tolerance_; }
   const Eigen::VectorXd& best_x() const { return best_x_; }
@@ -77,7 +76,6 @@ class NlpSearch {
 
   const double constraint_tolerance_;
   const std::function<bool(const NlpProgress&)>& progress_;
-  PointRecords* const records_;                 // may be null
   const double margin_;                         // of the scaled objective
   std::unordered_map<std::string, Kept> kept_;  // by the bytes of x
   std::deque<std::string> order_;               // oldest first

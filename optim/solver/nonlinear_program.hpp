@@ -85,15 +85,6 @@ struct NlpHessians {
   std::vector<Eigen::MatrixXd> of;  // f, and each constraint
 };
 
-// The points of an earlier run, and a place to record new ones: a killed run continues from there.
-struct PointRecords {
-  virtual ~PointRecords() = default;
-  virtual bool recall(const Eigen::VectorXd& x, Wanted wanted, NlpPoint& point) = 0;
-  virtual void record(const Eigen::VectorXd& x, Wanted wanted, const NlpPoint& point) = 0;
-  virtual bool recall(const Eigen::VectorXd& x, NlpHessians& hessians) = 0;
-  virtual void record(const Eigen::VectorXd& x, const NlpHessians& hessians) = 0;
-};
-
 // The input and output of every solver.
 struct NlpProgress {
   int iteration = 0;

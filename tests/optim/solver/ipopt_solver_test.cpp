@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <map>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -307,24 +306,6 @@ struct Convex : NonlinearProgram {
   int evaluated = 0, asked = 0;
 };
 
-struct Remembered : PointRecords {
-  static std::vector<double> key(const Eigen::VectorXd& x) { return {x.begin(), x.end()}; }
-  bool recall(const Eigen::VectorXd& x, Wanted, NlpPoint& point) override {
-    if (!points.contains(key(x))) return false;
-    point = points[key(x)];
-    return true;
-  }
-  void record(const Eigen::VectorXd& x, Wanted, const NlpPoint& point) override { points[key(x)] = point; }
-  bool recall(const Eigen::VectorXd& x, NlpHessians& H) override {
-    if (!hessians.contains(key(x))) return false;
-    H = hessians[key(x)];
-    return true;
-  }
-  void record(const Eigen::VectorXd& x, const NlpHessians& H) override { hessians[key(x)] = H; }
-  std::map<std::vector<double>, NlpPoint> points;
-  std::map<std::vector<double>, NlpHessians> hessians;
-};
-
 int newton_iterations(double x) {
   int count = 0;
   for (; std::abs(std::exp(x) - 1) > 1e-6; ++count) x -= (std::exp(x) - 1) / std::exp(x);
@@ -354,18 +335,4 @@ TEST_CASE("ipopt: each step with an exact Hessian is an iteration", "[ipopt]") {
   CHECK(visited.back() == result.x(0));
   CHECK(told.front() == Approx(std::exp(start) - 1));
   CHECK(told.back() == Approx(std::abs(result.point.f_x(0))));
-}
-
-TEST_CASE("ipopt: records hold all that exact Hessians take", "[ipopt]") {
-  Convex problem;
-  Remembered records;
-  IpoptOptions options;
-  options.second_order = true, options.records = &records;
-  const NlpResult first = solve_with_ipopt(problem, vector({2}), options);
-  REQUIRE(problem.asked > 0);
-  problem.evaluated = problem.asked = 0;
-  const NlpResult again = solve_with_ipopt(problem, vector({2}), options);
-  CHECK(again.x == first.x);
-  CHECK(again.iterations == first.iterations);
-  CHECK(problem.evaluated + problem.asked == 0);
 }
