@@ -7,7 +7,6 @@
 
 #include "app/results/objective_units.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "app/terminal/text_table.hpp"
 #include "optim/check/gradient_check.hpp"
 #include "optim/objective/evaluator.hpp"
 #include "optim/problem/load_cases.hpp"
@@ -25,34 +24,29 @@ void add_cases(Run& run, bool gradients, GradientMethod method) {
   if (problem.cases.empty() || problem.objectives.empty() || interrupted()) return;
   const std::vector<std::string> objectives = names_of(problem.objectives);
   const std::vector<std::string> parameters = names_of(problem.scene.parameters);
-  std::vector<std::string> header{"case"};
   EvaluatorOptions options;
-  options.method = method, options.progress = run.watched("load cases"), options.threads = case_threads(run);
+  options.method = method;
+  options.progress = run.watched("load cases");
+  options.threads = case_threads(run);
   Evaluator evaluator(problem, objectives, parameters, options);
   const Eigen::VectorXd rho = evaluator.start();
   const Evaluation all = gradients ? evaluator.gradients(rho) : evaluator.values(rho);
   run.progress.finish();
   if (!all.ok) return run.broke_off("the load cases are incomplete", all.message);
   const std::vector<std::optional<double>> true_values = evaluator.true_values(rho);
-  header.insert(header.end(), objectives.begin(), objectives.end());
-  TextTable table(header);
   for (std::size_t c = 0; c < evaluator.cases(); ++c) {
     const Evaluation& e = all.of_cases[c];
-    TableRow row{evaluator.case_name(c)};
     Json& result = run.result["cases"][evaluator.case_name(c)]["objectives"];
     for (std::size_t i = 0; i < objectives.size(); ++i) {
       const Eigen::Index at = static_cast<Eigen::Index>(i);
       const std::optional<double>& true_value = true_values[c * objectives.size() + i];
       result[objectives[i]] = objective_json(e.psi(at), true_value);
       if (gradients && !parameters.empty()) result[objectives[i]]["gradient"] = by_name(parameters, e.psi_rho.row(at));
-      row.push_back(significant(e.psi(at), 10) +
-                    (true_value ? fmt::format(" ({})", significant(*true_value, 10)) : ""));
     }
-    table.add(std::move(row));
   }
-  run.context.out << '\n' << table.text();
-  if (std::any_of(true_values.begin(), true_values.end(), [](const auto& value) { return value.has_value(); }))
-    run.context.out << "in brackets: the true extreme\n";
+  Json shown{{"cases", run.result["cases"]}};
+  add_units(shown, objective_units(problem));
+  run.context.out << '\n' << objective_table(shown).text();
 }
 
 bool check_cases(Run& run) {
