@@ -1,14 +1,21 @@
-#include "core/cvodes/cvodes_adjoint.hpp"
-
+// Adjoint sensitivities by CVODES. lambda has one column per objective. One backward problem holds all columns, which
+// share each solution of the equations of motion. lambda and mu solve
+//   lambda' = -f_y'lambda - g_y,      mu' = -(f_rho'lambda + g_rho),
+// backward from lambda(T) = d terminal/dy, mu(T) = d terminal/drho. At the time of a sampled cost lambda jumps by its
+// gradient. A multistep method cannot step over a jump: it starts again there, at order one. mu is a quadrature with an
+// error control of its own. Its steps are bounded by the forward ones. The forward solution is the method's polynomial
+// between stored steps. CVODES uses checkpoints if there are too many steps to store.
 #include <fmt/format.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "core/body/state_layout.hpp"
 #include "core/cvodes/cvodes.hpp"
+#include "core/cvodes/cvodes_run.hpp"
 #include "core/run/run_ends.hpp"
 
 namespace mbsopt::cvodes {
@@ -16,7 +23,6 @@ namespace {
 
 // Memory for the steps between two checkpoints. CVODES holds all of them at once: forward, and again on the way back.
 constexpr std::size_t kBytesOfSteps = std::size_t{32} << 20;
-constexpr std::size_t kBytesOfVector = 1024;  // beside its numbers: SUNDIALS' table of operations is 0.6 KB
 constexpr long kFewestSteps = 100, kMostSteps = 20'000;
 
 long steps_between_checkpoints(Eigen::Index states) {
@@ -24,7 +30,62 @@ long steps_between_checkpoints(Eigen::Index states) {
   return std::clamp(static_cast<long>(kBytesOfSteps / bytes), kFewestSteps, kMostSteps);
 }
 
-}  // namespace
+class Adjoint final : public Follower {
+ public:
+  Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs);
+
+  // Takes a step of the forward run and keeps what the backward run needs.
+  int advance(void* memory, double end, N_Vector y, double* t) override {
+    return CVodeF(memory, end, y, t, CV_ONE_STEP, &checkpoints_);
+  }
+  void take_sample(const SampleEvent& event, const StatePoint& at) override;
+  void take_step(const StatePoint& at) override;
+  // Integrates from the end to the start; run.result() says how it ended.
+  void go_back(const RunOptions& options);
+  const Eigen::MatrixXd& lambda() const { return lambda_; }  // at the start, 14n x objectives
+  const Eigen::MatrixXd& mu() const { return mu_; }          // parameters x objectives
+  std::size_t bytes() const;
+  long factorisations() const { return linear_solver_.factorisations(); }
+
+ private:
+  struct Jump {
+    double time;
+    Eigen::Index objective;
+    Eigen::VectorXd y_bar;
+  };
+  template <Eigen::VectorXd Adjoint::*Rate>
+  static int rate(realtype t, N_Vector y, N_Vector lambda, N_Vector out, void* self);
+  bool evaluate(double t, N_Vector y, N_Vector lambda);  // both rates
+  void add_terminal_costs();
+  void take_jumps(double t);  // of samples at or after t
+  void create_backward();
+  double largest_step(double t) const;
+  bool go_back_to(double t, double from, const RunOptions& options);
+  void failed(int flag);
+
+  ForwardRun& run_;
+  const SimulationSettings settings_;
+  std::span<const Cost> costs_;
+  Eigen::Index states_, objectives_, active_;
+  long kept_steps_;
+  int checkpoints_ = 0, which_ = -1;
+  long steps_ = 0;  // of the backward run
+  double tie_;      // times closer than this are one
+  std::vector<Jump> jumps_;
+  // Per objective: source_ is the largest entry of any gradient in y that enters. `running_source_` is the integral
+  // over the steps so far of that of the running cost, and last_size_ its entry at the last step.
+  Eigen::VectorXd source_, running_source_, last_size_;
+  double last_time_;
+  Eigen::MatrixXd lambda_, mu_;
+  // The time and the results of the last evaluation.
+  double t_;
+  Eigen::VectorXd lambda_at_, lambda_rate_, mu_rate_;
+  Eigen::VectorXd w_, y_bar_, theta_bar_, rho_bar_;
+
+  Vector lambda_vector_, mu_vector_;
+  LinearSolver linear_solver_;
+  NonlinearSolver fixed_point_;
+};
 
 Adjoint::Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs)
     : run_(run),
@@ -51,19 +112,12 @@ Adjoint::Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<
   theta_bar_.setZero(d.slots());
   rho_bar_.setZero(d.rho.size());
   run.require(CVodeAdjInit(run.memory(), kept_steps_, CV_POLYNOMIAL));
-  room_ = std::make_unique_for_overwrite<std::byte[]>(
-      static_cast<std::size_t>(kept_steps_) * (sizeof(double) * static_cast<std::size_t>(states_) + kBytesOfVector));
 }
 
 std::size_t Adjoint::bytes() const {
   // A checkpoint holds the method's history: at most 13 states, 6 of BDF.
   const std::size_t vectors = static_cast<std::size_t>(kept_steps_) + 13 * static_cast<std::size_t>(checkpoints_ + 1);
   return sizeof(double) * static_cast<std::size_t>(states_) * (vectors + jumps_.size()) + run_.flow().history_bytes();
-}
-
-int Adjoint::advance(double end, N_Vector y, double* t) {
-  room_.reset();
-  return CVodeF(run_.memory(), end, y, t, CV_ONE_STEP, &checkpoints_);
 }
 
 void Adjoint::take_sample(const SampleEvent& event, const StatePoint& at) {
@@ -89,7 +143,7 @@ void Adjoint::take_step(const StatePoint& at) {
   last_time_ = at.t;
 }
 
-void Adjoint::begin() {
+void Adjoint::add_terminal_costs() {
   const StatePoint end = run_.end();
   for (Eigen::Index o = 0; o < objectives_; ++o) {
     const Cost& cost = costs_[static_cast<std::size_t>(o)];
@@ -228,7 +282,7 @@ bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
 }
 
 void Adjoint::go_back(const RunOptions& options) {
-  begin();
+  add_terminal_costs();
   take_jumps(settings_.end_time);
   *lambda_vector_ = lambda_.reshaped();
   create_backward();
@@ -253,26 +307,20 @@ void Adjoint::go_back(const RunOptions& options) {
   }
 }
 
+}  // namespace
 }  // namespace mbsopt::cvodes
 
 namespace mbsopt {
 
 SimulationResult cvodes_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
                                 std::span<const Cost> costs, const RunOptions& options) {
+  if (costs.empty()) return cvodes_simulate(mechanism, settings, costs, {}, options);
   cvodes::ForwardRun run(mechanism, settings, costs, options);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   if (!result.ok()) return run.finish();
-  if (costs.empty()) {
-    run.go({}, {});
-    return run.finish();
-  }
   cvodes::Adjoint adjoint(run, settings, costs);
-  cvodes::ForwardRun::Hooks hooks;
-  hooks.advance = [&](double end, N_Vector y, double* t) { return adjoint.advance(end, y, t); };
-  hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) { adjoint.take_sample(event, at); };
-  hooks.accepted = [&](const StatePoint& at) { adjoint.take_step(at); };
-  run.go({}, hooks);
+  run.go({}, adjoint);
   if (!result.ok()) return run.finish();
   result.statistics.adjoint_memory_bytes = adjoint.bytes();
   adjoint.go_back(options);

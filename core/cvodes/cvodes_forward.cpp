@@ -1,13 +1,56 @@
-#include "core/cvodes/cvodes_forward.hpp"
-
+// Forward sensitivities by CVODES: s_k = dy/drho_k solves
+//   s_k' = f_y s_k + f_rho_k,     s_k(t0) = dy0/drho_k, through the assembly
+// beside the state (staggered corrector), for all parameters at once. The sensitivities have an error control of their
+// own: rtol, and atol over the parameter's size. Running costs integrate g_y s_k + g_rho_k under the same control.
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "core/body/state_layout.hpp"
 #include "core/cvodes/cvodes.hpp"
+#include "core/cvodes/cvodes_run.hpp"
+#include "core/mechanism/parameter_lanes.hpp"
 
 namespace mbsopt::cvodes {
+namespace {
+
+class Sensitivities final : public Follower {
+ public:
+  // Registers the sensitivities with CVODES, if a parameter is active.
+  Sensitivities(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs,
+                const TangentSampling& sampling);
+
+  bool differentiates() const override { return !active_.empty(); }
+  void take_sample(const SampleEvent& event, const StatePoint& at) override;
+  void count(void* memory, long& failed_error_tests, long& iterations) const override;
+  // Adds integrals and terminal costs, after the last step.
+  void finish();
+
+ private:
+  static int f(int count, realtype t, N_Vector y, N_Vector ydot, N_Vector* s, N_Vector* sdot, void* run, N_Vector,
+               N_Vector);
+  static int g(int count, realtype t, N_Vector y, N_Vector* s, N_Vector gdot, N_Vector* gsdot, void* run, N_Vector,
+               N_Vector);
+  void register_with(const SimulationSettings& settings);
+  void set_y_rho();
+  // psi_rho of one objective += g_y S + g_rho
+  void add_cost(const PointCost& cost, const StatePoint& at, Eigen::Index objective);
+
+  ForwardRun& run_;
+  std::span<const Cost> costs_;
+  const TangentSampling& sampling_;
+  const std::vector<int>& active_;
+  const int count_;
+  std::vector<ParameterBlock> blocks_;
+  LaneRows direction_, change_;
+  Eigen::VectorXd y_bar_, rho_bar_;
+  Eigen::MatrixXd y_rho_;
+  Eigen::MatrixXd& psi_rho_;  // of the result
+  VectorArray s_;
+  Vector rate_;  // dy/dt at a sample
+  NonlinearSolver fixed_point_;
+};
 
 Sensitivities::Sensitivities(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs,
                              const TangentSampling& sampling)
@@ -15,47 +58,51 @@ Sensitivities::Sensitivities(ForwardRun& run, const SimulationSettings& settings
       costs_(costs),
       sampling_(sampling),
       active_(run.flow().data().active),
+      count_(static_cast<int>(active_.size())),
       blocks_(parameter_blocks(run.flow().data())),
-      s_(static_cast<int>(active_.size()), StateLayout{run.flow().data().n}.size(), run.context()),
+      psi_rho_(run.result().psi_rho),
+      s_(std::max(1, count_), StateLayout{run.flow().data().n}.size(), run.context()),
       rate_(StateLayout{run.flow().data().n}.size(), run.context()) {
   const MechanismData& d = run.flow().data();
   const Eigen::Index states = StateLayout{d.n}.size();
-  const int count = static_cast<int>(active_.size());
   direction_.setZero(states, kLanes), change_.setZero(states, kLanes);
   y_bar_.setZero(states), rho_bar_.setZero(d.rho.size());
   y_rho_.setZero(states, d.rho.size());
   psi_rho_.setZero(static_cast<Eigen::Index>(costs.size()), d.rho.size());
+  if (count_ > 0 && run.result().ok()) register_with(settings);
+}
 
-  const Eigen::MatrixXd y0_rho = run.assembly().tangent();
+void Sensitivities::register_with(const SimulationSettings& settings) {
+  const MechanismData& d = run_.flow().data();
+  const Eigen::MatrixXd y0_rho = run_.assembly().tangent();
   std::vector<double> size, atol;
-  for (int k = 0; k < count; ++k) {
+  for (int k = 0; k < count_; ++k) {
     const int parameter = active_[static_cast<std::size_t>(k)];
     s_.at(k) = y0_rho.col(parameter);
     size.push_back(parameter_size(d.rho(parameter)));
     atol.push_back(settings.integrator.atol / size.back());
   }
-  void* memory = run.memory();
-  run.set_sensitivities(this);
-  run.require(CVodeSensInit(memory, count, CV_STAGGERED, f, s_));
-  run.require(CVodeSensSStolerances(memory, settings.integrator.rtol, atol.data()));
-  run.require(CVodeSetSensErrCon(memory, SUNTRUE));
+  void* memory = run_.memory();
+  run_.require(CVodeSensInit(memory, count_, CV_STAGGERED, f, s_));
+  run_.require(CVodeSensSStolerances(memory, settings.integrator.rtol, atol.data()));
+  run_.require(CVodeSetSensErrCon(memory, SUNTRUE));
   if (!is_stiff_method(settings)) {
-    fixed_point_.reset(SUNNonlinSol_FixedPointSens(count, s_[0], 0, run.context()));
-    run.require(CVodeSetNonlinearSolverSensStg(memory, fixed_point_.get()));
+    fixed_point_.reset(SUNNonlinSol_FixedPointSens(count_, s_[0], 0, run_.context()));
+    run_.require(CVodeSetNonlinearSolverSensStg(memory, fixed_point_.get()));
   }
-  if (run.running().empty()) return;
-  const Eigen::Index quadratures = static_cast<Eigen::Index>(run.running().size());
-  const VectorArray none(count, quadratures, run.context()), tolerances(count, quadratures, run.context());
-  const Eigen::VectorXd atol_g = run.quadrature_atol();
-  for (int k = 0; k < count; ++k) tolerances.at(k) = atol_g / size[static_cast<std::size_t>(k)];
-  run.require(CVodeQuadSensInit(memory, g, none));
-  run.require(CVodeQuadSensSVtolerances(memory, settings.integrator.rtol, tolerances));
-  run.require(CVodeSetQuadSensErrCon(memory, SUNTRUE));
+  if (run_.running().empty()) return;
+  const Eigen::Index quadratures = static_cast<Eigen::Index>(run_.running().size());
+  const VectorArray none(count_, quadratures, run_.context()), tolerances(count_, quadratures, run_.context());
+  const Eigen::VectorXd atol_g = run_.quadrature_atol();
+  for (int k = 0; k < count_; ++k) tolerances.at(k) = atol_g / size[static_cast<std::size_t>(k)];
+  run_.require(CVodeQuadSensInit(memory, g, none));
+  run_.require(CVodeQuadSensSVtolerances(memory, settings.integrator.rtol, tolerances));
+  run_.require(CVodeSetQuadSensErrCon(memory, SUNTRUE));
 }
 
 int Sensitivities::f(int count, realtype t, N_Vector y, N_Vector, N_Vector* s, N_Vector* sdot, void* run, N_Vector,
                      N_Vector) {
-  Sensitivities& self = *static_cast<ForwardRun*>(run)->sensitivities();
+  Sensitivities& self = static_cast<Sensitivities&>(static_cast<ForwardRun*>(run)->follower());
   return self.run_.flow().thrown().keep([&] {
     Flow& flow = self.run_.flow();
     if (!flow.linearise(t, values(y))) return kTryASmallerStep;
@@ -72,7 +119,7 @@ int Sensitivities::f(int count, realtype t, N_Vector y, N_Vector, N_Vector* s, N
 
 int Sensitivities::g(int count, realtype t, N_Vector y, N_Vector* s, N_Vector, N_Vector* gsdot, void* run, N_Vector,
                      N_Vector) {
-  Sensitivities& self = *static_cast<ForwardRun*>(run)->sensitivities();
+  Sensitivities& self = static_cast<Sensitivities&>(static_cast<ForwardRun*>(run)->follower());
   return self.run_.flow().thrown().keep([&] {
     const StatePoint at = self.run_.flow().point(t, values(y));
     for (std::size_t q = 0; q < self.run_.running().size(); ++q) {
@@ -89,50 +136,58 @@ int Sensitivities::g(int count, realtype t, N_Vector y, N_Vector* s, N_Vector, N
 }
 
 void Sensitivities::add_cost(const PointCost& cost, const StatePoint& at, Eigen::Index objective) {
+  if (count_ == 0) return;
   y_bar_.setZero(), rho_bar_.setZero();
   cost.add_gradient(at, 1, y_bar_, rho_bar_);
   psi_rho_.row(objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
 }
 
-// Passes the state and its rate, which delays of measurements need.
-void observe(ForwardRun& run, const TangentSampling& sampling, const SampleEvent& event, StatePoint at, Vector& rate,
-             const Eigen::MatrixXd& y_rho) {
-  run.require(CVodeGetDky(run.memory(), event.time, 1, rate));
-  const Eigen::VectorXd ydot = *rate;
-  at.ydot = &ydot;
-  sampling.observe(event.index, at, y_rho);
-}
-
-void Sensitivities::take_sample(const SampleEvent& event, const StatePoint& at) {
-  run_.require(CVodeGetSensDky(run_.memory(), event.time, 0, s_));
+void Sensitivities::set_y_rho() {
   for (std::size_t k = 0; k < active_.size(); ++k) y_rho_.col(active_[k]) = s_.at(static_cast<int>(k));
-  if (event.cost) {
-    add_cost(*event.cost, at, event.objective);
-  } else if (sampling_.observe) {
-    observe(run_, sampling_, event, at, rate_, y_rho_);
-  }
 }
 
-const Eigen::MatrixXd& Sensitivities::finish() {
+// Observers also get the rate of the state, which delays of measurements need.
+void Sensitivities::take_sample(const SampleEvent& event, const StatePoint& at) {
+  if (count_ > 0) run_.require(CVodeGetSensDky(run_.memory(), event.time, 0, s_));
+  set_y_rho();
+  if (event.cost) return add_cost(*event.cost, at, event.objective);
+  if (!sampling_.observe) return;
+  run_.require(CVodeGetDky(run_.memory(), event.time, 1, rate_));
+  const Eigen::VectorXd ydot = *rate_;
+  StatePoint with_rate = at;
+  with_rate.ydot = &ydot;
+  sampling_.observe(event.index, with_rate, y_rho_);
+}
+
+void Sensitivities::count(void* memory, long& failed_error_tests, long& iterations) const {
+  if (count_ == 0) return;
+  long failed = 0, more = 0;
+  CVodeGetSensNumErrTestFails(memory, &failed);
+  CVodeGetSensNumNonlinSolvIters(memory, &more);
+  failed_error_tests += failed;
+  iterations += more;
+}
+
+void Sensitivities::finish() {
+  if (count_ == 0) return;
   const StatePoint end = run_.end();
   double t = end.t;
   run_.require(CVodeGetSens(run_.memory(), &t, s_));
-  for (std::size_t k = 0; k < active_.size(); ++k) y_rho_.col(active_[k]) = s_.at(static_cast<int>(k));
+  set_y_rho();
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     if (costs_[o].terminal) add_cost(*costs_[o].terminal, end, static_cast<Eigen::Index>(o));
   }
-  if (run_.running().empty()) return psi_rho_;
-  const VectorArray integrals(static_cast<int>(active_.size()), static_cast<Eigen::Index>(run_.running().size()),
-                              run_.context());
+  if (run_.running().empty()) return;
+  const VectorArray integrals(count_, static_cast<Eigen::Index>(run_.running().size()), run_.context());
   run_.require(CVodeGetQuadSens(run_.memory(), &t, integrals));
   for (std::size_t k = 0; k < active_.size(); ++k) {
     for (std::size_t q = 0; q < run_.running().size(); ++q) {
       psi_rho_(run_.running()[q], active_[k]) += integrals.at(static_cast<int>(k))(static_cast<Eigen::Index>(q));
     }
   }
-  return psi_rho_;
 }
 
+}  // namespace
 }  // namespace mbsopt::cvodes
 
 namespace mbsopt {
@@ -141,24 +196,9 @@ SimulationResult cvodes_forward(const Mechanism& mechanism, const SimulationSett
                                 std::span<const Cost> costs, const TangentSampling& sampling,
                                 const RunOptions& options) {
   cvodes::ForwardRun run(mechanism, settings, costs, options);
-  const Eigen::Index objectives = static_cast<Eigen::Index>(costs.size());
-  run.result().psi_rho.setZero(objectives, mechanism.parameters());
-  if (!run.result().ok()) return run.finish();
-  if (mechanism.data().active.empty()) {  // nothing to follow
-    const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters());
-    cvodes::ForwardRun::Hooks hooks;
-    cvodes::Vector rate(mechanism.states(), run.context());
-    hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) {
-      if (!event.cost && sampling.observe) cvodes::observe(run, sampling, event, at, rate, none);
-    };
-    run.go(sampling.times, hooks);
-    return run.finish();
-  }
   cvodes::Sensitivities sensitivities(run, settings, costs, sampling);
-  cvodes::ForwardRun::Hooks hooks;
-  hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) { sensitivities.take_sample(event, at); };
-  run.go(sampling.times, hooks);
-  if (run.result().ok()) run.result().psi_rho = sensitivities.finish();
+  run.go(sampling.times, sensitivities);
+  if (run.result().ok()) sensitivities.finish();
   return run.finish();
 }
 

@@ -5,16 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <stdexcept>
 
+#include "core/cvodes/cvodes.hpp"
 #include "core/run/run_ends.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/start/model_warnings.hpp"
 #include "core/step/step_control.hpp"
 #include "core/step/step_failure.hpp"
+#include "core/tableau/tableaus.hpp"
 #include "core/watch/jump_watch.hpp"
 #include "core/watch/run_guard.hpp"
 #include "core/watch/weak_joints.hpp"
@@ -26,6 +28,23 @@ namespace {
 // Numbers up to this one have a finite square, also after division by tolerances.
 constexpr double kLargestRate = 1e120;
 constexpr long kMostIterations = std::numeric_limits<int>::max();
+
+const SimulationSettings& possible(const SimulationSettings& settings, const RunOptions& options) {
+  const std::string& type = settings.integrator.type;
+  if (!is_cvodes(type)) throw std::invalid_argument(fmt::format("integrator '{}' is not one of CVODES'", type));
+  if (settings.integrator.step) {
+    throw std::invalid_argument(
+        fmt::format("integrator '{}' chooses its own steps: give rtol and atol, no step", type));
+  }
+  if (!settings.events.empty()) {
+    throw std::invalid_argument(fmt::format("integrator '{}' does not end steps at simulation.events", type));
+  }
+  if (options.frozen) {
+    throw std::invalid_argument(
+        fmt::format("integrator '{}' cannot repeat the steps of another run: its steps and orders are its own", type));
+  }
+  return settings;
+}
 
 }  // namespace
 
@@ -110,14 +129,11 @@ void ForwardRun::set_up() {
 
 // An integral's absolute tolerance is the larger of atol and rtol times its rate at the start times the whole span. The
 // exponential of a smooth maximum may have any size.
-Eigen::VectorXd ForwardRun::quadrature_atol() const {
+Eigen::VectorXd ForwardRun::quadrature_atol() {
   Eigen::VectorXd atol(static_cast<Eigen::Index>(running_.size()));
-  const Eigen::VectorXd& y = assembly_.result().y;
-  std::optional<MotionSolver> motion;
-  if (mechanism_.data().needs_motion) motion.emplace(mechanism_, settings_.formulation);
+  const StatePoint start{settings_.start_time, assembly_.result().y, assembly_.result().angles, flow_.motion()};
   for (std::size_t k = 0; k < running_.size(); ++k) {
-    const double rate = std::abs(costs_[static_cast<std::size_t>(running_[k])].running->value(
-        {settings_.start_time, y, assembly_.result().angles, motion ? &*motion : nullptr}));
+    const double rate = std::abs(costs_[static_cast<std::size_t>(running_[k])].running->value(start));
     const double size = rate < kLargestRate ? rate * (settings_.end_time - settings_.start_time) : 0;
     atol(static_cast<Eigen::Index>(k)) = std::max(settings_.integrator.atol, settings_.integrator.rtol * size);
   }
@@ -161,47 +177,29 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
   // h is the step that CVODES tried last. CVODES itself reports only the step that it proposed before its own
   // reductions.
   const double h = std::abs(flow_.last_time() - t);
-  switch (flag) {
-    case CV_RHSFUNC_FAIL:
-    case CV_FIRST_RHSFUNC_ERR:
-    case CV_REPTD_RHSFUNC_ERR:
-    case CV_UNREC_RHSFUNC_ERR:
-    case CV_SRHSFUNC_FAIL:
-    case CV_FIRST_SRHSFUNC_ERR:
-    case CV_REPTD_SRHSFUNC_ERR:
-    case CV_UNREC_SRHSFUNC_ERR:
-      stop(SimulationStatus::not_finite, not_computable(of_what, t));
-      return;
-    case CV_TOO_MUCH_ACC:
-      stop(SimulationStatus::step_too_small, too_few_digits(settings_.integrator, t));
-      return;
-    case CV_TOO_MUCH_WORK:
-      stop(SimulationStatus::too_many_steps,
-           fmt::format(
-               "more than {} steps were needed; stopped at t = {:.6g} s. Loosen rtol and atol, raise "
-               "simulation.integrator.max_steps{}",
-               settings_.integrator.max_steps, t,
-               is_stiff_method(settings_) ? "" : ", or take cvodes_bdf where springs or dampers are very stiff"));
-      return;
-    case CV_ERR_FAILURE:
-    case CV_CONV_FAILURE:
-    case CV_TOO_CLOSE:
-    case CV_LSETUP_FAIL:
-      // CVODES gives up if h is the smallest step, within its own tolerance of 1e-6.
-      if (const auto min_step = settings_.integrator.options.min_step; min_step && h <= *min_step * (1 + 1e-6)) {
-        stop(SimulationStatus::step_too_small,
-             below_min_step(flag == CV_ERR_FAILURE ? StepOutcome::rejected : StepOutcome::unsolved, t, *min_step));
-        return;
-      }
-      stop(SimulationStatus::step_too_small,
-           fmt::format("no step beyond t = {:.6g} s is small enough for the tolerances (the last one tried was {:.3g} "
-                       "s). Look for {}a singular position, a spring of zero length or a law that is not smooth near "
-                       "this time; CVODES does not project onto the constraints, a Runge-Kutta method may pass it",
-                       t, h, about_quadratures()));
-      return;
-    default:
-      stop(SimulationStatus::step_too_small, fmt::format("CVODES stopped at t = {:.6g} s: {}", t, last_words_));
-  }
+  const auto is = [&](std::initializer_list<int> flags) { return std::ranges::find(flags, flag) != flags.end(); };
+  if (is({CV_RHSFUNC_FAIL, CV_FIRST_RHSFUNC_ERR, CV_REPTD_RHSFUNC_ERR, CV_UNREC_RHSFUNC_ERR, CV_SRHSFUNC_FAIL,
+          CV_FIRST_SRHSFUNC_ERR, CV_REPTD_SRHSFUNC_ERR, CV_UNREC_SRHSFUNC_ERR}))
+    return stop(SimulationStatus::not_finite, not_computable(of_what, t));
+  if (flag == CV_TOO_MUCH_ACC) return stop(SimulationStatus::step_too_small, too_few_digits(settings_.integrator, t));
+  if (flag == CV_TOO_MUCH_WORK)
+    return stop(
+        SimulationStatus::too_many_steps,
+        fmt::format("more than {} steps were needed; stopped at t = {:.6g} s. Loosen rtol and atol, raise "
+                    "simulation.integrator.max_steps{}",
+                    settings_.integrator.max_steps, t,
+                    is_stiff_method(settings_) ? "" : ", or take cvodes_bdf where springs or dampers are very stiff"));
+  if (!is({CV_ERR_FAILURE, CV_CONV_FAILURE, CV_TOO_CLOSE, CV_LSETUP_FAIL}))
+    return stop(SimulationStatus::step_too_small, fmt::format("CVODES stopped at t = {:.6g} s: {}", t, last_words_));
+  // CVODES gives up if h is the smallest step, within its own tolerance of 1e-6.
+  if (const auto min_step = settings_.integrator.options.min_step; min_step && h <= *min_step * (1 + 1e-6))
+    return stop(SimulationStatus::step_too_small,
+                below_min_step(flag == CV_ERR_FAILURE ? StepOutcome::rejected : StepOutcome::unsolved, t, *min_step));
+  stop(SimulationStatus::step_too_small,
+       fmt::format("no step beyond t = {:.6g} s is small enough for the tolerances (the last one tried was {:.3g} "
+                   "s). Look for {}a singular position, a spring of zero length or a law that is not smooth near "
+                   "this time; CVODES does not project onto the constraints, a Runge-Kutta method may pass it",
+                   t, h, about_quadratures()));
 }
 
 // Names the running costs if their integrals demanded smaller steps.
@@ -231,30 +229,25 @@ bool ForwardRun::step_is_followed(double h) {
   return true;
 }
 
-void ForwardRun::take_samples(SampleSchedule& schedule, double t, const Hooks& hooks) {
+void ForwardRun::take_samples(SampleSchedule& schedule, double t) {
   for (const SampleEvent& e : schedule.take(t)) {
     require(CVodeGetDky(memory(), e.time, 0, y_sample_));
     const StatePoint at = flow_.point(e.time, *y_sample_);
     if (e.cost) result_.psi(e.objective) += e.cost->value(at);
-    if (hooks.sampled) hooks.sampled(e, at);
+    follower_->take_sample(e, at);
   }
 }
 
 // Counts the steps of the state and those of its derivatives.
 void ForwardRun::count_steps() {
-  long state = 0, derivatives = 0, not_converged = 0, iterations = 0, their_iterations = 0;
-  CVodeGetNumErrTestFails(memory(), &state);
-  CVodeGetNumStepSolveFails(memory(), &not_converged);
-  CVodeGetNumNonlinSolvIters(memory(), &iterations);
-  if (sensitivities_) {
-    CVodeGetSensNumErrTestFails(memory(), &derivatives);
-    CVodeGetSensNumNonlinSolvIters(memory(), &their_iterations);
-  }
   SimulationStatistics& s = result_.statistics;
-  s.rejections.error_test = state + derivatives;
-  s.rejections.not_converged = not_converged;
-  s.rejected = s.rejections.error_test + not_converged;
-  if (is_stiff_method(settings_)) s.newton_iterations = iterations + their_iterations;
+  long iterations = 0;
+  CVodeGetNumErrTestFails(memory(), &s.rejections.error_test);
+  CVodeGetNumStepSolveFails(memory(), &s.rejections.not_converged);
+  CVodeGetNumNonlinSolvIters(memory(), &iterations);
+  follower_->count(memory(), s.rejections.error_test, iterations);
+  s.rejected = s.rejections.error_test + s.rejections.not_converged;
+  if (is_stiff_method(settings_)) s.newton_iterations = iterations;
   s.linear_solves = flow_.evaluations() + linear_solver_.solves();
 }
 
@@ -278,15 +271,14 @@ double ForwardRun::stop_before_pulse(double t, PulseWatch& pulses) {
 }
 
 // One internal step from t to t1. Returns false, with the reason in the result, if there is none.
-bool ForwardRun::advance(double t, const Hooks& hooks, double& t1) {
+bool ForwardRun::advance(double t, double& t1) {
   count_steps();
   if (result_.statistics.steps + result_.statistics.rejected >= settings_.integrator.max_steps) {
     stop_for(CV_TOO_MUCH_WORK, t, "");
     return false;
   }
-  const double end = settings_.end_time;
   t1 = t;
-  const int flag = hooks.advance ? hooks.advance(end, y_, &t1) : CVode(memory(), end, y_, &t1, CV_ONE_STEP);
+  const int flag = follower_->advance(memory(), settings_.end_time, y_, &t1);
   flow_.thrown().throw_on();
   if (flag < 0) {
     stop_for(flag, t, "the accelerations or their derivatives");
@@ -296,8 +288,9 @@ bool ForwardRun::advance(double t, const Hooks& hooks, double& t1) {
   return result_.ok();
 }
 
-void ForwardRun::go(std::span<const double> observed, const Hooks& hooks) {
+void ForwardRun::go(std::span<const double> observed, Follower& follower) {
   if (!result_.ok()) return;
+  follower_ = &follower;
   const double end = settings_.end_time;
   double t = settings_.start_time, t1 = t;
   SampleSchedule schedule(costs_, observed, end);
@@ -307,13 +300,13 @@ void ForwardRun::go(std::span<const double> observed, const Hooks& hooks) {
   });
   ObserverOf samples([&](const SeenStep& step) {
     t = result_.last_good_time = step.to.t;
-    take_samples(schedule, t, hooks);
-    if (hooks.accepted) hooks.accepted(step.to);
+    take_samples(schedule, t);
+    follower.take_step(step.to);
     return std::string();
   });
   std::optional<JumpWatch> jumps;
   std::vector<StepObserver*> observers{&guard};
-  if (hooks.advance || sensitivities_)
+  if (follower.differentiates())
     observers.insert(observers.end(), {&lengths, &jumps.emplace(mechanism_, settings_, costs_, flow_.motion())});
   observers.push_back(&samples);
   // CVODES sees the rates at the ends of a step.
@@ -322,7 +315,7 @@ void ForwardRun::go(std::span<const double> observed, const Hooks& hooks) {
   if (!words.empty()) stop(SimulationStatus::not_credible, std::move(words));
   while (t < end && result_.ok()) {
     require(CVodeSetStopTime(memory(), stop_before_pulse(t, pulses)));
-    if (!advance(t, hooks, t1)) break;
+    if (!advance(t, t1)) break;
     y_before_ = y_now_;
     y_now_ = *y_;
     if (!step_is_followed(t1 - t)) break;
@@ -372,3 +365,37 @@ SimulationResult ForwardRun::finish() {
 }
 
 }  // namespace mbsopt::cvodes
+
+namespace mbsopt {
+
+bool is_cvodes(std::string_view integrator) { return integrator == "cvodes_adams" || integrator == "cvodes_bdf"; }
+
+SimulationSettings with_cvodes(SimulationSettings settings) {
+  std::string& type = settings.integrator.type;
+  const Method* method = runge_kutta_method(type);
+  if (!is_cvodes(type)) {
+    type = method && method->implicit() ? "cvodes_bdf" : "cvodes_adams";
+    settings.integrator.options = {};  // the other method's
+  }
+  settings.integrator.step.reset();
+  if (settings.solve == Solve::kinematics) settings.solve = Solve::automatic;
+  return settings;
+}
+
+SimulationResult cvodes_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
+                                 std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options) {
+  struct Observed final : cvodes::Follower {
+    explicit Observed(const Sampling& s) : sampling(s) {}
+    bool differentiates() const override { return false; }
+    void take_sample(const SampleEvent& event, const StatePoint& at) override {
+      if (!event.cost && sampling.observe) sampling.observe(event.index, at);
+    }
+    const Sampling& sampling;
+  };
+  cvodes::ForwardRun run(mechanism, settings, costs, options);
+  Observed observed(sampling);
+  run.go(sampling.times, observed);
+  return run.finish();
+}
+
+}  // namespace mbsopt

@@ -1,10 +1,9 @@
 // Forward integration by CVODES, one internal step at a time. The running costs are quadratures with error control.
-// Samples come from the method's own interpolating polynomial and never force a step; the end time does. Derivatives
-// attach to the run through Hooks.
+// Samples come from the method's own interpolating polynomial and never force a step; the end time does. Observers and
+// derivatives follow the run as its Follower.
 #pragma once
 
 #include <cmath>
-#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,26 +22,27 @@
 namespace mbsopt::cvodes {
 
 bool is_stiff_method(const SimulationSettings& settings);  // cvodes_bdf
-// Returns the settings. Throws std::invalid_argument for a type that CVODES does not have, a fixed step, or frozen
-// steps.
-const SimulationSettings& possible(const SimulationSettings& settings, const RunOptions& options);
 // The return values of right-hand sides that CVODES calls.
 inline constexpr int kOk = 0, kTryASmallerStep = 1;
-
-class Sensitivities;  // cvodes_forward.hpp
 
 // The size by which tolerances of a derivative are divided.
 inline double parameter_size(double rho) { return rho == 0 ? 1 : std::abs(rho); }
 
+// What follows a forward run. It may carry derivatives.
+struct Follower {
+  virtual ~Follower() = default;
+  virtual bool differentiates() const { return true; }
+  // Takes one step towards end.
+  virtual int advance(void* memory, double end, N_Vector y, double* t) { return CVode(memory, end, y, t, CV_ONE_STEP); }
+  virtual void take_sample(const SampleEvent& event, const StatePoint& at) = 0;  // of a cost, or an observation
+  virtual void take_step(const StatePoint&) {}
+  // Adds those of the derivatives.
+  virtual void count(void* /*memory*/, long& /*failed_error_tests*/, long& /*iterations*/) const {}
+};
+
 class ForwardRun {
  public:
-  struct Hooks {
-    // CVode or CVodeF, one step towards end.
-    std::function<int(double end, N_Vector y, double* t)> advance;
-    std::function<void(const SampleEvent& event, const StatePoint& at)> sampled;  // a cost's, or an observation
-    std::function<void(const StatePoint& at)> accepted;                           // after each step
-  };
-
+  // Throws std::invalid_argument for a type that CVODES does not have, a fixed step, or frozen steps.
   ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
              const RunOptions& options);
   ForwardRun(const ForwardRun&) = delete;
@@ -54,12 +54,11 @@ class ForwardRun {
   Flow& flow() { return flow_; }
   SimulationResult& result() { return result_; }
   const std::vector<Eigen::Index>& running() const { return running_; }  // objectives with a running cost
-  Eigen::VectorXd quadrature_atol() const;                               // of each of these
+  Eigen::VectorXd quadrature_atol();                                     // of each of these
 
   // From assembly to the end, with values of all costs; result() says how it ended.
-  void go(std::span<const double> observed, const Hooks& hooks);
-  void set_sensitivities(Sensitivities* sensitivities) { sensitivities_ = sensitivities; }
-  Sensitivities* sensitivities() const { return sensitivities_; }
+  void go(std::span<const double> observed, Follower& follower);
+  Follower& follower() const { return *follower_; }  // during go()
   // The value of a running cost, or of its derivative. A value beyond the range of a quadrature makes psi not finite,
   // as an infinite sum would. From then on 0 is integrated, since so large a derivative may change its sign within
   // rounding.
@@ -77,8 +76,8 @@ class ForwardRun {
   void set_up();
   bool step_is_followed(double h);
   double stop_before_pulse(double t, PulseWatch& pulses);
-  bool advance(double t, const Hooks& hooks, double& t1);
-  void take_samples(SampleSchedule& schedule, double t, const Hooks& hooks);
+  bool advance(double t, double& t1);
+  void take_samples(SampleSchedule& schedule, double t);
   void add_integrals();
   void count_steps();  // rejected ones, and the work of their solutions
   static int f(realtype t, N_Vector y, N_Vector ydot, void* self);
@@ -97,7 +96,7 @@ class ForwardRun {
   std::vector<Eigen::Index> running_;
   std::vector<bool> left_range_;
   std::string last_words_;  // of CVODES
-  Sensitivities* sensitivities_ = nullptr;
+  Follower* follower_ = nullptr;
   Eigen::VectorXd y_before_, y_now_, y_change_;  // at the ends of the last step
 
   Context context_;
