@@ -34,13 +34,10 @@ void add_parameters(Run& run) {
 
 void add_motions(Run& run, const Mechanism& mechanism, const Assembly& assembly) {
   const int freedoms = run.result.at("model").at("degrees_of_freedom").get<int>();
-  const auto add = [&](const char* key, const char* words, const std::vector<std::string>& motions) {
-    run.result["model"][key] = motions;
-    for (const std::string& motion : motions) run.context.out << fmt::format("{}: {}\n", words, motion);
-  };
-  add("free", "free", free_motions(mechanism, assembly, run.problem.scene.simulation.start_time, freedoms));
-  if (!run.result["model"]["redundant"].empty())
-    add("forbidden_twice", "forbidden twice", motions_forbidden_twice(mechanism, assembly));
+  const std::vector<std::string> motions =
+      free_motions(mechanism, assembly, run.problem.scene.simulation.start_time, freedoms);
+  run.result["model"]["free"] = motions;
+  for (const std::string& motion : motions) run.context.out << fmt::format("free: {}\n", motion);
 }
 
 }  // namespace

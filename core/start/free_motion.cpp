@@ -9,10 +9,6 @@
 // number of degrees of freedom differs, nothing is reported.
 //
 // The L_b are independent of each other, so that R has the rank  columns of N - columns of L.
-//
-// Redundant equations: let J_0 be the rows before those of a joint, J_j the rows of the joint. Its combinations y'J_j
-// that depend on J_0 are y'(J_j N_0) = 0, N_0 the null space of J_0. Each is a wrench (f, m) on a body of the joint:
-// rows before already forbid the motion on which it would do work. Wrenches with f = 0 forbid turns.
 #include "core/start/free_motion.hpp"
 
 #include <fmt/format.h>
@@ -26,6 +22,7 @@
 #include "core/expression/counted.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/projection/projection.hpp"
 #include "core/start/nearest_point_linearisation.hpp"
 #include "core/start/poses.hpp"
 
@@ -36,10 +33,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostBodies = 40;    // dense decompositions of 6n columns stay within milliseconds
-constexpr double kStep = 1e-3;     // to the position near by [rad]: far above kZero, and within reach of Newton's steps
-constexpr double kClosed = 1e-12;  // |Phi| there [m, rad]: rounding
-constexpr double kZero = 1e-6;     // of a motion's size: above the rounding of a null vector
+constexpr int kMostBodies = 40;  // dense decompositions of 6n columns stay within milliseconds
+constexpr double kStep = 1e-3;   // to the position near by [rad]: far above kZero, and within reach of Newton's steps
+constexpr double kZero = 1e-6;   // of a motion's size: above the rounding of a null vector
 constexpr std::size_t kMostNames = 8;  // in one sentence
 
 struct JointPoint {
@@ -68,16 +64,6 @@ class MotionNames {
     return sentences_;
   }
 
-  std::vector<std::string> forbidden_twice() const {
-    std::vector<std::string> sentences;
-    for (std::size_t j = 0; j < d_.joint_names.size(); ++j) {
-      const std::string motions = forbidden_twice(static_cast<int>(j));
-      if (!motions.empty())
-        sentences.push_back(fmt::format("joint '{}' forbids again that {}", d_.joint_names[j], motions));
-    }
-    return sentences;
-  }
-
   // d(q)/d(s) along a general motion of all groups: at most one radian, or one metre if nothing turns.
   VectorXd general_motion(const VectorXd& y) const {
     VectorXd xi = VectorXd::Zero(6 * layout_.n);
@@ -96,47 +82,6 @@ class MotionNames {
   }
 
  private:
-  std::string forbidden_twice(int joint) const {
-    Index begin = J_.rows(), end = 0;
-    int body = 0;
-    for (const Constraint& c : d_.constraints) {
-      if (c.joint != joint || c.drive >= 0) continue;
-      begin = std::min<Index>(begin, c.row), end = std::max<Index>(end, c.row + c.rows());
-      body = c.body2 > 0 ? c.body2 : c.body1;
-    }
-    if (body == 0 || begin >= end) return {};
-    const MatrixXd before = J_.topRows(begin), rows = J_.middleRows(begin, end - begin);
-    const MatrixXd free_before = free_in(before);
-    const MatrixXd y = free_before.cols() == 0 ? MatrixXd(MatrixXd::Identity(rows.rows(), rows.rows()))
-                                               : free_in(without_rounding((rows * free_before).transpose()));
-    if (y.cols() == 0) return {};
-    const MatrixXd wrench = rows.middleCols<6>(layout_.z(body)).transpose() * y;
-    Vector3d arm = Vector3d::Zero();  // from the joint to the centre of mass, to which moments refer
-    for (const JointPoint& point : points_[at(body)])
-      if (point.joint == d_.joint_names[at(joint)]) arm = frames_[at(body)].r - point.place;
-    const MatrixXd f = without_rounding(wrench.topRows<3>());
-    MatrixXd m = frames_[at(body)].A * wrench.bottomRows<3>();
-    for (Index k = 0; k < m.cols(); ++k) m.col(k) += arm.cross(Vector3d(f.col(k)));
-    std::vector<std::string> motions;
-    if (!f.isZero(0)) motions.push_back("slides along " + directions(f, "direction"));
-    const MatrixXd turns = without_rounding(m * free_in(f));
-    if (!turns.isZero(0)) motions.push_back("turns about " + directions(turns, "axis"));
-    return motions.empty() ? std::string() : fmt::format("{} {}", name(body), fmt::join(motions, ", "));
-  }
-
-  // Rows of J have unit length.
-  static MatrixXd without_rounding(const MatrixXd& A) {
-    return (A.array().abs() < UnitRows::kRankThreshold).select(MatrixXd::Zero(A.rows(), A.cols()), A);
-  }
-
-  // The space that the columns span: a line, a plane or all.
-  static std::string directions(const MatrixXd& columns, const char* what) {
-    const MatrixXd normals = free_in(columns.transpose());
-    if (normals.cols() == 0) return fmt::format("every {}", what);
-    if (normals.cols() == 1) return fmt::format("every {} normal to {}", what, direction(normals.col(0)));
-    return direction(Vector3d(normals.col(0)).cross(Vector3d(normals.col(1))));
-  }
-
   // Collects the points where joints touch their bodies.
   void add_points(const Constraint& c) {
     if (c.joint < 0) return;
@@ -273,10 +218,12 @@ std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly
   if (degrees_of_freedom == 0 || data.n > kMostBodies || !assembly.result().ok) return {};
   const VectorXd& y = assembly.result().y;
   MotionNames here(data, y);
-  VectorXd moved = y;
+  VectorXd moved = y, closed = y;
   moved.head(StateLayout{data.n}.positions()) += kStep * here.general_motion(y);
-  if (close_joints(data, start_time, assembly.result().angles, UnitRows::kRankThreshold, moved) > kClosed) return {};
-  const MotionNames::Sentences at_start = here.sentences(), near_by = MotionNames(data, moved).sentences();
+  const std::unique_ptr<Projector> projector = make_projector(mechanism, Projection::position_velocity);
+  ProjectionSolution solution = projector->solution();
+  if (!projector->project(start_time, assembly.result().angles, moved, closed, solution)) return {};
+  const MotionNames::Sentences at_start = here.sentences(), near_by = MotionNames(data, closed).sentences();
   if (at_start.all != degrees_of_freedom || near_by.all != degrees_of_freedom) return {};
   // A user knows the axes at the start, so these are named.
   std::vector<std::string> all = at_start.freedoms == near_by.freedoms ? at_start.alone : near_by.alone;
@@ -289,12 +236,6 @@ std::string freedoms_in_words(const Mechanism& mechanism, const Assembly& assemb
   const std::vector<std::string> motions = free_motions(mechanism, assembly, start_time, freedoms);
   return fmt::format("{}{}{}", counted(freedoms, "degree of freedom", "degrees of freedom"),
                      motions.empty() ? "" : ": ", fmt::join(motions, "; "));
-}
-
-std::vector<std::string> motions_forbidden_twice(const Mechanism& mechanism, const Assembly& assembly) {
-  const MechanismData& data = mechanism.data();
-  if (data.n > kMostBodies || !assembly.result().ok) return {};
-  return MotionNames(data, assembly.result().y).forbidden_twice();
 }
 
 }  // namespace mbsopt

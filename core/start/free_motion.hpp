@@ -1,4 +1,4 @@
-// Sentences on the motion that the constraints leave at the assembled start, and on motions that they forbid twice.
+// Sentences on the motion that the constraints leave at the assembled start.
 //
 //   'coupler' turns about the axis through joints 'B' and 'C'
 //   'crank', 'coupler', 'rocker' move together
@@ -19,10 +19,5 @@ std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly
 
 // "1 degree of freedom: 'coupler' turns about ..."; the number alone if the motion is uncertain.
 std::string freedoms_in_words(const Mechanism& mechanism, const Assembly& assembly, double start_time);
-
-// The motions that redundant equations forbid a second time, a sentence per joint:
-//
-//   joint 'D' forbids again that 'rocker_bar' slides along [0, 0, 1], turns about every axis normal to [0, 0, 1]
-std::vector<std::string> motions_forbidden_twice(const Mechanism& mechanism, const Assembly& assembly);
 
 }  // namespace mbsopt

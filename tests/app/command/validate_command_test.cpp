@@ -48,27 +48,6 @@ TEST_CASE("validate names the motion that is free", "[command]") {
   }
 }
 
-// A planar loop of revolutes about n = [0, -sin 0.6, cos 0.6] holds its plane already: the last joint's equations along
-// n and against turns out of the plane are three too many. A second hinge beside a first one: all five.
-TEST_CASE("validate names the motion that redundant equations forbid twice", "[command]") {
-  const TemporaryFolder folder;
-  const CommandOutcome loop =
-      run_command({"validate", file_of("four_bar/redundant").string(), "--out", folder.file("a")});
-  CHECK_THAT(loop.out, Contains("redundant: D (3 of 5)"));
-  CHECK_THAT(loop.out, Contains("joint 'D' forbids again that 'rocker_bar' slides along [0, -0.565, 0.825], turns "
-                                "about every axis normal to [0, -0.565, 0.825]"));
-  CHECK(json_of(folder.path / "a/result.json").at("model").at("forbidden_twice").size() == 1);
-  std::string text = kPendulum;
-  const std::string pin = R"("point1": [0, 0, 0], "point2": "O", "axis1": [0, 0, 1], "axis2": [0, 0, 1]})";
-  text.insert(text.find(pin) + pin.size(),
-              R"(, {"name": "second", "type": "revolute", "body2": "rod", "point1": [0, 0, 0.1], "point2": [0, 0, 0.1],
-                  "axis1": [0, 0, 1], "axis2": [0, 0, 1]})");
-  const CommandOutcome hinges = run_command({"validate", folder.write("rod.json", text), "--out", folder.file("b")});
-  INFO(hinges.err);
-  CHECK_THAT(hinges.out, Contains("forbidden twice: joint 'second' forbids again that 'rod' slides along every "
-                                  "direction, turns about every axis normal to [0, 0, 1]"));
-}
-
 TEST_CASE("validate and simulate refuse motion without any mass", "[command]") {
   const TemporaryFolder folder;
   const std::string command = GENERATE(as<std::string>{}, "validate", "simulate", "design");
