@@ -369,10 +369,10 @@ double Assembly::rounding() const {
   return rounding;
 }
 
-std::vector<std::string> Assembly::equilibrium_warnings() const {
+std::string Assembly::equilibrium_warning() const {
   const Solution& s = *solution_;
   if (!s.equilibrium.ok) return {};
-  return mbsopt::equilibrium_warnings(s.mechanism, s.start, s.equilibrium.q, s.equilibrium.angles);
+  return mbsopt::equilibrium_warning(s.mechanism, s.start, s.equilibrium.q, s.equilibrium.angles);
 }
 
 int Assembly::degrees_of_freedom() const {

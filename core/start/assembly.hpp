@@ -47,8 +47,8 @@ class Assembly {
   // 1e-14 in metres, more where lengths are far from 1 m. It is 0 where nothing is free, and not estimated for many
   // bodies.
   double rounding() const;
-  // Doubts about the static equilibrium (equilibrium.hpp); empty if the scene does not start from one.
-  std::vector<std::string> equilibrium_warnings() const;
+  // A warning of an unstable static equilibrium (equilibrium.hpp); empty if the scene does not start from one.
+  std::string equilibrium_warning() const;
 
  private:
   struct Solution;

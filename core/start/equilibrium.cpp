@@ -28,8 +28,6 @@ constexpr double kLargestStep = 0.2;   // of a coordinate at once [lengths of th
 constexpr double kApart = 0.05;        // the places along a step at which forces are computed [the same]
 constexpr double kNearPlaces = 1e-3;   // of a step: places as near to each other are one
 constexpr double kBeside = 1e-5;       // from the equilibrium, to see where the forces drive it [the same]
-constexpr double kAtKink = 1e-7;       // an equilibrium as near to a kink is at it [the same]
-constexpr double kLeastKink = 1e-6;    // of the change of forces over this distance, whose rounding is 1e-8
 constexpr double kTolerance = 1e-11;   // of the last Newton step [lengths of the mechanism, rad]
 constexpr double kRounding = 1e-14;    // of the terms of a force: a few additions
 constexpr double kLargestError = 0.5;  // of a step, relative to it: the linear equations predict the rest
@@ -314,29 +312,6 @@ int leaving_body(Statics& statics, const FreeMotion& free, const VectorXd& q) {
   return 0;
 }
 
-// The body whose forces have a kink at the equilibrium q; else 0. At a kink the second difference over h falls as h,
-// and elsewhere as h^2.
-int kinked_body(Statics& statics, const FreeMotion& free, const VectorXd& q) {
-  const VectorXd xi = free.N * VectorXd::LinSpaced(free.N.cols(), 1, 2);  // moves all that is free
-  if (!statics.evaluate(q)) return 0;
-  const VectorXd f = statics.loads();
-  Eigen::ArrayXd bend[2];
-  double change = 0;
-  for (const int k : {0, 1}) {
-    const double h = (k == 0 ? kAtKink : 0.1 * kAtKink) / statics.size_of(xi);
-    bend[k] = -2 * f.array();
-    for (const double side : {h, -h}) {
-      if (!statics.evaluate_beside(q, side * xi)) return 0;
-      bend[k] += statics.loads().array();
-      change = std::max(change, (statics.loads() - f).lpNorm<Eigen::Infinity>());
-    }
-  }
-  const Eigen::ArrayXd near = bend[1].abs();
-  Index most = 0;
-  const double kink = (near > 0.05 * bend[0].abs()).select(near, 0).maxCoeff(&most);
-  return kink > kLeastKink * change ? static_cast<int>(most / 6) + 1 : 0;
-}
-
 }  // namespace
 
 Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const VectorXd& q_guess, const VectorXd& angles) {
@@ -361,26 +336,18 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
   return e;
 }
 
-std::vector<std::string> equilibrium_warnings(const Mechanism& mechanism, double t, const VectorXd& q,
-                                              const VectorXd& angles) {
-  std::vector<std::string> warnings;
+std::string equilibrium_warning(const Mechanism& mechanism, double t, const VectorXd& q, const VectorXd& angles) {
   Statics statics(mechanism, t, q, angles);
-  if (!statics.evaluate(q)) return warnings;
+  if (!statics.evaluate(q)) return {};
   const FreeMotion free(statics);
-  if (free.N.cols() == 0 || !free.regular) return warnings;
-  const MechanismData& d = mechanism.data();
-  if (const int body = leaving_body(statics, free, q); body > 0)
-    warnings.push_back(
-        fmt::format("the static equilibrium is unstable: the forces drive body '{}' away as soon as it moves a little. "
-                    "The guess lies on the ridge between two valleys; move it into the valley that is meant",
-                    d.body_names[at(body)]));
-  if (d.active.empty()) return warnings;
-  if (const int body = kinked_body(statics, free, q); body > 0)
-    warnings.push_back(fmt::format(
-        "the forces on body '{}' have a kink exactly at the static equilibrium: its derivatives are those of "
-        "one side, and differ on the other",
-        d.body_names[at(body)]));
-  return warnings;
+  if (free.N.cols() == 0 || !free.regular) return {};
+  const int body = leaving_body(statics, free, q);
+  if (body == 0) return {};
+  return fmt::format(
+      "the static equilibrium is unstable: the forces drive body '{}' away as soon as it moves a little. The guess "
+      "lies "
+      "on the ridge between two valleys; move it into the valley that is meant",
+      mechanism.data().body_names[at(body)]);
 }
 
 }  // namespace mbsopt

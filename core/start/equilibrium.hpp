@@ -15,7 +15,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "core/mechanism/mechanism.hpp"
 
@@ -33,8 +32,8 @@ struct Equilibrium {
 // q_guess must satisfy the constraints. angles holds branches of followed joint angles there.
 Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Eigen::VectorXd& q_guess,
                                const Eigen::VectorXd& angles);
-// Sentences on an equilibrium q that is unstable, or at which a force has a kink.
-std::vector<std::string> equilibrium_warnings(const Mechanism& mechanism, double t, const Eigen::VectorXd& q,
-                                              const Eigen::VectorXd& angles);
+// A sentence on an equilibrium q that is unstable; empty for a stable one.
+std::string equilibrium_warning(const Mechanism& mechanism, double t, const Eigen::VectorXd& q,
+                                const Eigen::VectorXd& angles);
 
 }  // namespace mbsopt

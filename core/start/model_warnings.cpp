@@ -334,7 +334,7 @@ std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assemb
   add_springs(d, y, warnings);
   add_reactions(mechanism, assembly.result(), warnings);
   add_rounding_of_derivatives(assembly, warnings);
-  for (std::string& warning : assembly.equilibrium_warnings()) warnings.push_back(std::move(warning));
+  if (std::string warning = assembly.equilibrium_warning(); !warning.empty()) warnings.push_back(std::move(warning));
   return warnings;
 }
 

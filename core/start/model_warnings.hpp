@@ -3,7 +3,7 @@
 //   massless directions that no joint holds        (M is singular on the null space of J: no acceleration there)
 //   springs of zero length                         (they have no direction)
 //   gravity normal to the plane of the mechanism   (it moves nothing)
-//   a static equilibrium that is unstable or at a kink
+//   a static equilibrium that is unstable
 //   rounding of the derivatives of the start       (lengths far from 1 m)
 //   a guess that violates joints by much           (the assembled state may be another than the one that was meant)
 #pragma once
