@@ -7,7 +7,7 @@ set(public
   core/scene/scene.hpp core/scene/settings.hpp core/scene/kinematic_scene.hpp core/scene/issues.hpp
   core/mechanism/mechanism.hpp core/mechanism/state_point.hpp core/force/user_force.hpp core/expression/curve.hpp
   core/run/cost.hpp core/run/simulation_result.hpp core/simulate/simulation.hpp core/simulate/simulation_warnings.hpp
-  core/start/assembly.hpp core/start/kinematics.hpp core/start/linearisation.hpp core/start/state_query.hpp
+  core/start/assembly.hpp core/start/linearisation.hpp core/start/state_query.hpp core/driven/kinematics.hpp
   optim/problem/problem.hpp optim/problem/csv_table.hpp optim/problem/parameter_values.hpp
   optim/objective/objective.hpp optim/objective/evaluator.hpp optim/objective/hessian.hpp
   optim/design/design.hpp optim/fit/identification.hpp optim/check/gradient_check.hpp

@@ -11,9 +11,9 @@
 #include "app/results/simulated_motion.hpp"
 #include "app/run/command.hpp"
 #include "app/terminal/interrupt.hpp"
+#include "core/driven/kinematics.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/kinematic_scene.hpp"
-#include "core/start/kinematics.hpp"
 
 namespace mbsopt::inline app {
 namespace {
@@ -40,24 +40,22 @@ struct DriveEfforts {
       table.columns.push_back(d.drive_names[static_cast<std::size_t>(law.drive)]);
     }
   }
-  // Keeps the efforts if they are finite, and returns whether they are. NaN may have no limit at a singular position.
-  bool record(const StatePoint& at) {
-    std::vector<double> row{at.t};
+  void record(const StatePoint& at) {
+    std::vector<double>& row = table.rows.emplace_back(std::vector<double>{at.t});
     const Motion& motion = at.motion->motion(at);
     for (const int r : rows) row.push_back(-motion.lambda(r));
-    if (std::ranges::any_of(row, [](double x) { return std::isinf(x); })) return false;
-    table.rows.push_back(std::move(row));
-    return true;
   }
 };
 
-// Returns whether all efforts that have a limit are numbers.
-bool are_numbers(const DriveEfforts& efforts, const KinematicsResult& kinematics) {
-  return std::ranges::all_of(efforts.table.rows, [&](const std::vector<double>& row) {
-    return std::ranges::none_of(row, [](double x) { return std::isnan(x); }) ||
-           std::ranges::any_of(kinematics.singular,
-                               [&](const SingularPosition& s) { return std::abs(row[0] - s.t) < s.half; });
-  });
+// The rows up to the first one with an effort that is no number, unless it has no limit at a singular position.
+std::size_t finite_rows(const DriveEfforts& efforts, const std::vector<SingularPosition>& singular) {
+  const auto is_finite = [&](const std::vector<double>& row) {
+    const bool nan_has_cause =
+        std::ranges::any_of(singular, [&](const SingularPosition& s) { return std::abs(row[0] - s.t) < s.half; });
+    return std::ranges::all_of(row, [&](double x) { return std::isfinite(x) || (std::isnan(x) && nan_has_cause); });
+  };
+  const std::vector<std::vector<double>>& rows = efforts.table.rows;
+  return static_cast<std::size_t>(std::ranges::find_if_not(rows, is_finite) - rows.begin());
 }
 
 void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
@@ -94,54 +92,44 @@ int kinematics_command(const CommandContext& context) {
   const Sampling sampling = record_trajectory(mechanism, scene, trajectory);
   DriveEfforts efforts(mechanism.data());
   JointForces forces(scene, parameter_values(scene), sampling.times.size());
-  bool finite = true;
-  SimulationStatistics statistics;
   const SimulationSettings& settings = scene.simulation;
-  const KinematicsResult kinematics = solve_kinematics(
+  SimulationResult kinematics = solve_kinematics(
       mechanism, assembly, settings, sampling.times,
       [&](std::size_t i, const StatePoint& at) {
         sampling.observe(i, at);
         forces.observe(i, at);
-        finite = efforts.record(at);
-        const Energy e = energy(mechanism.data(), at.y, at.angles);
-        statistics.energy_final = e.kinetic + e.potential;
-        if (i == 0) statistics.energy_initial = statistics.energy_final;
-        statistics.energy_drift =
-            std::max(statistics.energy_drift, std::abs(statistics.energy_final - statistics.energy_initial));
-        return finite;
+        efforts.record(at);
       },
-      [&](double t) {
-        run.progress.fraction("kinematics", (t - settings.start_time) / (settings.end_time - settings.start_time));
-        return !interrupted();
-      });
+      run.watched("kinematics"));
   run.progress.finish();
-  finite = finite && are_numbers(efforts, kinematics);
-  statistics.steps = kinematics.steps;
-  statistics.max_position_violation = kinematics.max_position_violation;
-  statistics.max_velocity_violation = kinematics.max_velocity_violation;
+  SimulationStatistics& statistics = kinematics.statistics;
+  const std::size_t finite = finite_rows(efforts, statistics.singular);
+  const bool are_finite = finite == efforts.table.rows.size();
+  const double last_good_time = are_finite ? kinematics.last_good_time : efforts.table.rows[finite].front();
+  efforts.table.rows.resize(finite);
   statistics.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   run.result["simulation"] = to_json(statistics);
   context.out << fmt::format(
       "{:.6g} s to {:.6g} s in {} positions by {} steps; largest violation {:.1e} (positions), "
       "{:.1e} (velocities)\n",
-      settings.start_time, kinematics.last_good_time, trajectory.rows.size(), kinematics.steps,
-      kinematics.max_position_violation, kinematics.max_velocity_violation);
+      settings.start_time, last_good_time, trajectory.rows.size(), statistics.steps, statistics.max_position_violation,
+      statistics.max_velocity_violation);
   const bool motion_ends_early = interrupted();
-  write_trajectory(run, trajectory, kinematics.singular);
+  write_trajectory(run, trajectory, statistics.singular);
   if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
   add_drives(run, scene, efforts);
-  if (const std::string words = in_words(kinematics.singular, {}); !words.empty()) run.warn(words);
+  if (const std::string words = in_words(statistics.singular, {}); !words.empty()) run.warn(words);
   std::vector<PlotInstant> singular;
-  for (const SingularPosition& s : kinematics.singular) singular.push_back({"singular", s.t});
+  for (const SingularPosition& s : statistics.singular) singular.push_back({"singular", s.t});
   if (motion_ends_early) {
-    run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", kinematics.last_good_time));
-  } else if (!finite) {
+    run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", last_good_time));
+  } else if (!are_finite) {
     run.failed(fmt::format("the forces of the drives are too large for numbers at t = {:.6g} s. Look at masses, "
                            "inertias, coordinates and the forces on the bodies",
-                           kinematics.last_good_time),
-               kinematics.last_good_time);
-  } else if (!kinematics.ok) {
-    run.failed(kinematics.message, kinematics.last_good_time);
+                           last_good_time),
+               last_good_time);
+  } else if (!kinematics.ok()) {
+    run.failed(kinematics.message, last_good_time);
   }
   RunPage page(run);
   add_simulated_motion(page, scene, trajectory,

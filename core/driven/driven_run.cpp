@@ -7,12 +7,14 @@
 #include <cmath>
 
 #include "core/body/hermite.hpp"
+#include "core/body/state_layout.hpp"
+#include "core/constraint/constraint.hpp"
+#include "core/driven/singular_position.hpp"
 #include "core/driven/timed_instants.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/mechanism/mechanism_data.hpp"
-#include "core/start/kinematics.hpp"
-#include "core/step/event_times.hpp"
-#include "core/watch/jump_watch.hpp"
+#include "core/mechanism/planar_model.hpp"
+#include "core/run/run_ends.hpp"
 #include "core/watch/zero_length.hpp"
 
 namespace mbsopt {
@@ -36,27 +38,60 @@ constexpr double kPeak = 1e-3;
 // A panel of any length may be off by this part of rtol times the integral so far: it may hold a kink or a jump.
 constexpr double kPartOfRun = 0.1;
 
+// Returns whether a parameter moves a body, or a point of a joint, out of the plane.
+bool moves_out_of_plane(const MechanismData& d) {
+  if (d.active.empty()) return false;
+  const PlanarModel& plane = *d.planar;
+  const auto moves = [&](int slot, const auto& normal) {
+    if (slot < 0) return false;
+    constexpr double kRounding = 1e-14;  // of unit axes, in d theta/d rho
+    return (normal.transpose() * d.theta_rho.middleRows(slot, normal.size())).cwiseAbs().maxCoeff() >
+           kRounding * d.theta_rho.middleRows(slot, normal.size()).cwiseAbs().maxCoeff();
+  };
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[at(i)];
+    const PlanarBody& seen = plane.bodies[at(i)];
+    Eigen::Matrix4d in_plane = seen.p_a * seen.p_a.transpose() + seen.p_b * seen.p_b.transpose();
+    if (moves(body.slot_com, seen.n) || moves(body.slot_velocity, Vec<3>(Vec<3>::Unit(plane.n)))) return true;
+    if (body.slot_angular_velocity >= 0) return true;
+    if (body.slot_q < 0) continue;
+    if (moves(body.slot_q, Vec<3>(Vec<3>::Unit(plane.n)))) return true;
+    const Eigen::Matrix4d out = Eigen::Matrix4d::Identity() - in_plane;
+    for (int k = 0; k < 4; ++k)
+      if (moves(body.slot_q + 3, Vec<4>(out.col(k)))) return true;
+  }
+  return std::ranges::any_of(d.constraints, [&](const Constraint& c) {
+    const Vec<3> n1 = plane.bodies[at(c.body1)].n, n2 = plane.bodies[at(c.body2)].n;
+    return moves(c.slot1, n1) || moves(c.slot2, n2) || moves(c.slot3, n1) || moves(c.slot3, n2);
+  });
+}
+
+// In a plane, positions out of it are those of the assembly. If a parameter moves them, the run is spatial.
+Model model_for(const Mechanism& mechanism, const SimulationSettings& settings) {
+  const Model model = model_of(mechanism, settings, *runge_kutta_method(settings.integrator.type));
+  return model == Model::planar && moves_out_of_plane(mechanism.data()) ? Model::spatial : model;
+}
+
 }  // namespace
 
 DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                      std::span<const double> observed, const RunOptions& options, const Assembly& start,
-                     bool differentiated)
+                     bool differentiated, MotionSource* motion)
     : mechanism_(mechanism),
       settings_(settings),
       costs_(costs),
       options_(options),
-      model_(model_of(mechanism, settings, *runge_kutta_method(settings.integrator.type))),
-      path_(mechanism, model_),
+      frozen_(options.frozen),
+      path_(mechanism, model_for(mechanism, settings)),
       schedule_(costs, observed, settings.end_time),
       law_jumps_(mechanism.data()),
       differentiated_(differentiated),
-      events_(settings.events),
+      events_({}, settings.start_time, settings.end_time),
       shortest_(1e-9 * std::max(1e-3, settings.end_time - settings.start_time)),
+      h_(settings.end_time - settings.start_time),
       absolute_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.size()))) {
-  if (mechanism.data().needs_motion) {
-    motion_.emplace(mechanism, settings.formulation);
-    continued_.emplace(*motion_, [this](double t) { return window_at(t); });
-  }
+  if (!motion && mechanism.data().needs_motion) motion = &motion_.emplace(mechanism, settings.formulation);
+  if (motion) continued_.emplace(*motion, [this](double t) { return window_at(t); });
   result_.psi.setZero(static_cast<Eigen::Index>(costs.size()));
   result_.last_good_time = settings.start_time;
   result_.y_initial = start.result().y;
@@ -64,9 +99,11 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
   for (std::size_t o = 0; o < costs.size(); ++o) {
     if (costs[o].running) running_.push_back({costs[o].running.get(), static_cast<Eigen::Index>(o)});
   }
+  std::vector<double> events = settings.events;
   if (!running_.empty()) nodes_.resize(kNodes);
-  if (!running_.empty() && !options.frozen)
-    instants_ = timed_instants(mechanism, costs, settings.start_time, settings.end_time, shortest_, events_);
+  if (!running_.empty() && !frozen_)
+    instants_ = timed_instants(mechanism, costs, settings.start_time, settings.end_time, shortest_, events);
+  events_ = EventTimes(events, settings.start_time, settings.end_time);
   g_.resize(running_.size() * kNodes);
   integrals_.resize(running_.size()), errors_.resize(running_.size());
   path_.start(settings.start_time, settings.end_time, start.result().y, start.result().angles);
@@ -77,7 +114,8 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
 }
 
 void DrivenRun::stop(SimulationStatus status, const std::string& message) {
-  result_.status = status, result_.message = message;
+  result_.status = status;
+  result_.message = message;
 }
 
 bool DrivenRun::go_to(double t) { return path_.go_to(t, shortest_, kMostStepsOfStretch); }
@@ -104,30 +142,22 @@ void DrivenRun::go(const Take& take) {
   stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi) + (singular.empty() ? "" : "; " + singular));
 }
 
-// A Course holds what one panel of a run leaves to the next.
-struct DrivenRun::Course {
-  EventTimes events;
-  std::optional<JumpWatch> jumps;
-  double h;                     // of the next panel
-  double ended_at = -INFINITY;  // time at which a panel was stuck last
-  std::size_t panel = 0;
-};
-
 void DrivenRun::go_through_panels(const Take& take) {
   const double end = settings_.end_time;
-  Course course{EventTimes(events_, settings_.start_time, end), {}, end - settings_.start_time};
-  const StepSequence* const frozen = options_.frozen;
-  if (differentiated_ && !frozen) {
-    course.jumps.emplace(mechanism_, settings_, costs_, continued());
-    course.jumps->begin(point());
+  if (is_too_fast()) return;
+  if (differentiated_ && !frozen_) {
+    jumps_.emplace(mechanism_, settings_, costs_, continued());
+    jumps_->begin(point());
   }
-  while (path_.state().t < end) {
-    if (frozen && course.panel >= frozen->times.size()) break;
-    const double t = path_.state().t, t1 = frozen ? frozen_end(course) : next_end(course, t);
+  std::span<const SampleEvent> at_start = schedule_.take(path_.state().t);
+  if (!take_events_until(INFINITY, at_start, take)) return stop_at_singular_matrix();
+  std::vector<double>& begun = result_.steps.times;  // one for each panel
+  while (path_.state().t < end && !(frozen_ && begun.size() >= frozen_->times.size())) {
     from_ = path_.state();
+    const double t = from_.t, t1 = next_end();
     const Panel outcome = try_panel(t1);
-    if (outcome == Panel::refused || (outcome == Panel::stuck && !frozen && path_.state().t - t > shortest_)) {
-      try_shorter(course, outcome, t, t1);
+    if (outcome == Panel::refused || (outcome == Panel::stuck && !frozen_ && path_.state().t - t > shortest_)) {
+      try_shorter(outcome, t1);
       continue;
     }
     if (outcome == Panel::stuck) return stop_where_it_ends();
@@ -138,58 +168,62 @@ void DrivenRun::go_through_panels(const Take& take) {
                       "pole of the law of a drive; is it in rad and s?",
                       settings_.integrator.max_steps, t));
     }
-    if (!take_panel(t1, take)) {
-      if (result_.ok()) stop_at_singular_matrix();
-      return;
-    }
+    double resume = events_.reached(t1) ? events_.resume_time() : t1;
+    if (std::string jump = frozen_ ? std::string() : law_jumps_.between(t, resume); !jump.empty())
+      return stop(SimulationStatus::not_credible, std::move(jump));
+    if (!take_panel(t1, take)) return stop_at_singular_matrix();
     end_panel(t, t1);
-    const double resume = course.events.reached(t1) ? course.events.resume_time() : t1;
-    if (const std::string jump = options_.frozen ? std::string() : law_jumps_.between(t, resume); !jump.empty()) {
-      return stop(SimulationStatus::not_credible, jump);
-    }
-    if (course.jumps) course.jumps->look_at({point_of(from_), point()});
-    if (options_.after_step) options_.after_step(point());
-    if (options_.progress && !options_.progress(t1)) {
-      return stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", t1));
-    }
-    ++course.panel;
-    course.h *= 2;
-    const bool given = frozen && course.panel < frozen->times.size();
-    if (!go_to(given ? frozen->times[course.panel] : frozen ? t1 : resume)) {
-      return stop_where_it_ends();
-    }
+    if (jumps_) jumps_->look_at({point_of(from_), point()});
+    report_step(point(), options_, result_);
+    if (!result_.ok()) return;
+    h_ *= 2;
+    if (frozen_) resume = begun.size() < frozen_->times.size() ? frozen_->times[begun.size()] : t1;
+    if (!go_to(resume)) return stop_where_it_ends();
   }
-  if (course.jumps) course.jumps->add_to(result_.statistics);
+  if (jumps_) jumps_->add_to(result_.statistics);
   add_quadrature_errors();
 }
 
-double DrivenRun::frozen_end(const Course& course) const {
-  const StepSequence& frozen = *options_.frozen;
-  const bool last = course.panel + 1 == frozen.times.size() && frozen.to_the_end;
-  return last ? settings_.end_time : frozen.times[course.panel] + frozen.sizes[course.panel];
+// Ends a run in which the drives turn a body so fast at the start that its steps would not suffice.
+bool DrivenRun::is_too_fast() {
+  const long most = settings_.integrator.max_steps;
+  const double t = path_.state().t;
+  if (!(settings_.end_time - t > static_cast<double>(most) * path_.step_limit())) return false;
+  stop(SimulationStatus::too_many_steps,
+       fmt::format("at t = {:.6g} s the drives turn a body so fast that the motion until {:.6g} s takes more steps "
+                   "than simulation.integrator.max_steps, {}. Is the law in rad and s?",
+                   t, settings_.end_time, most));
+  return true;
 }
 
-double DrivenRun::next_end(Course& course, double t) const {
-  const double stop_at = course.events.stop_after(t);
-  course.h = std::min(course.h, largest_panel());
-  const double t1 = resolved_until(instants_, t, course.h >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + course.h);
+double DrivenRun::next_end() {
+  const double t = from_.t, end = settings_.end_time;
+  if (frozen_) {
+    const std::size_t panel = result_.steps.times.size();
+    const bool last = panel + 1 == frozen_->times.size() && frozen_->to_the_end;
+    return last ? end : frozen_->times[panel] + frozen_->sizes[panel];
+  }
+  const double stop_at = events_.stop_after(t);
+  h_ = std::min(h_, largest_panel());
+  const double t1 = resolved_until(instants_, t, h_ >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + h_);
   // Without integrals a panel ends at the next event, so that no part of the path is solved twice.
   const double event = schedule_.next_time();
   return running_.empty() && event > t ? std::min(t1, event) : t1;
 }
 
 // Other steps may pass where the path ended. If it ends there again, so does the panel.
-void DrivenRun::try_shorter(Course& course, Panel outcome, double t, double t1) {
-  const double reached = path_.state().t;
+void DrivenRun::try_shorter(Panel outcome, double t1) {
+  const double t = from_.t, reached = path_.state().t;
   ++result_.statistics.rejected, ++result_.statistics.rejections.error_test;
   path_.start(from_);
-  const bool ends =
-      outcome == Panel::stuck && std::abs(reached - course.ended_at) <= kSameEnd * (settings_.end_time - t);
-  if (outcome == Panel::stuck) course.ended_at = reached;
-  course.h = ends ? reached - t : (t1 - t) / 2;
+  const bool is_stuck = outcome == Panel::stuck;
+  const bool ends = is_stuck && std::abs(reached - ended_at_) <= kSameEnd * (settings_.end_time - t);
+  if (is_stuck) ended_at_ = reached;
+  h_ = ends ? reached - t : (t1 - t) / 2;
 }
 
 void DrivenRun::stop_at_singular_matrix() {
+  if (!result_.ok()) return;  // the path ended before
   stop(SimulationStatus::not_finite,
        fmt::format("the derivatives met a matrix that cannot be factored at t = {:.6g} s: a singular position?",
                    path_.state().t));
@@ -227,10 +261,10 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
       if (is_left_out(g[k], nodes_[k].t)) g[k] = 0, shortest = window_at(nodes_[k].t)->half;
     }
     integrals_[r] = integrate_panel(g, h);
-    if (options_.frozen || h <= shortest) continue;
+    if (frozen_ || h <= shortest) continue;
     if (integrals_[r].error > allowed_error(r, h)) return Panel::refused;  // the end of the run reports NaN
   }
-  return !options_.frozen && hides_a_peak(h) ? Panel::refused : Panel::accepted;
+  return !frozen_ && hides_a_peak(h) ? Panel::refused : Panel::accepted;
 }
 
 double DrivenRun::allowed_error(std::size_t r, double h) const {
@@ -258,7 +292,8 @@ bool DrivenRun::hides_a_peak(double h) {
         const double g = running_[r].cost->value(between);
         double expected = 0, size = std::abs(g);
         for (std::size_t i = 0; i < kNodes; ++i) {
-          expected += P[i] * g_[r * kNodes + i], size = std::max(size, std::abs(g_[r * kNodes + i]));
+          expected += P[i] * g_[r * kNodes + i];
+          size = std::max(size, std::abs(g_[r * kNodes + i]));
         }
         const double D = std::abs(g - expected);
         if (D > kPeak * size && D * gap / parts > allowed_error(r, h)) return true;
@@ -307,7 +342,8 @@ bool DrivenRun::take_panel(double t1, const Take& take) {
     const PanelIntegral& I = integrals_[r];
     const Eigen::Index o = running_[r].objective;
     result_.psi(o) += I.value;
-    absolute_(o) += I.absolute, errors_[r].of_run += I.error;
+    absolute_(o) += I.absolute;
+    errors_[r].of_run += I.error;
     if (I.error > errors_[r].worst) errors_[r].worst = I.error, errors_[r].worst_t = from_.t;
   }
   if (!take_events_until(INFINITY, events, take)) return false;

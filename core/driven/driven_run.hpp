@@ -27,6 +27,8 @@
 #include "core/start/assembly.hpp"
 #include "core/start/driven_path.hpp"
 #include "core/start/law_jumps.hpp"
+#include "core/step/event_times.hpp"
+#include "core/watch/jump_watch.hpp"
 
 namespace mbsopt {
 
@@ -43,14 +45,16 @@ class DrivenRun {
   // The run calls this at the instants in ascending order. It returns false if the derivatives failed there.
   using Take = std::function<bool(const StatePoint&, std::span<const DrivenTerm>)>;
 
+  // `motion` gives the accelerations; null: the equations of motion, if a sensor needs them.
   DrivenRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
-            std::span<const double> observed, const RunOptions& options, const Assembly& start, bool differentiated);
+            std::span<const double> observed, const RunOptions& options, const Assembly& start, bool differentiated,
+            MotionSource* motion = nullptr);
 
   // Computes psi of the result, and calls take at every instant.
   void go(const Take& take);
   SimulationResult& result() { return result_; }
   SimulationResult finish();
-  Model model() const { return model_; }
+  StatePoint point() { return point_of(path_.state()); }
   Projector& projector() { return path_.projector(); }
   const SingularWindow* window_at(double t) const { return path_.window_at(t); }
   const std::vector<SingularWindow>& windows() const { return path_.windows(); }
@@ -63,11 +67,10 @@ class DrivenRun {
   struct PanelErrors {  // of an integral: the sum, the largest of a panel, and when that begins
     double of_run = 0, worst = 0, worst_t = 0;
   };
-  struct Course;
   void go_through_panels(const Take& take);
-  double frozen_end(const Course& course) const;
-  double next_end(Course& course, double t) const;
-  void try_shorter(Course& course, Panel outcome, double t, double t1);
+  bool is_too_fast();
+  double next_end();
+  void try_shorter(Panel outcome, double t1);
   Panel try_panel(double t1);
   double allowed_error(std::size_t r, double h) const;
   bool hides_a_peak(double h);
@@ -82,7 +85,6 @@ class DrivenRun {
   void stop_at_singular_matrix();
   bool go_to(double t);
   void stop_where_it_ends();  // with the reason why the path cannot continue
-  StatePoint point() { return point_of(path_.state()); }
   StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, continued()}; }
   double value_of(const DrivenTerm& term, const StatePoint& at);
   void note_uncertain();
@@ -92,15 +94,18 @@ class DrivenRun {
   const SimulationSettings& settings_;
   std::span<const Cost> costs_;
   const RunOptions& options_;
-  const Model model_;
+  const StepSequence* const frozen_;  // the panels to take, or null
   DrivenPath path_;
   std::optional<MotionSolver> motion_;  // set if a sensor needs it
   std::optional<ContinuedMotion> continued_;
   SampleSchedule schedule_;
   LawJumps law_jumps_;
   const bool differentiated_;
-  std::vector<double> events_;       // those of the file, and jumps of functions of time
+  EventTimes events_;                // those of the file, and jumps of functions of time
+  std::optional<JumpWatch> jumps_;   // of runs with derivatives
   const double shortest_;            // step or panel [s]
+  double h_;                         // of the next panel [s]
+  double ended_at_ = -INFINITY;      // the time at which a panel was stuck last
   std::vector<DrivenTerm> running_;  // of one node
   std::vector<DrivenTerm> at_instant_;
   std::vector<DrivenState> nodes_;  // of the panel; none without running costs

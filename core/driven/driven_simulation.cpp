@@ -11,7 +11,6 @@
 #include "core/constraint/constraint.hpp"
 #include "core/cvodes/cvodes.hpp"
 #include "core/driven/driven_run.hpp"
-#include "core/dynamics/planar_bodies.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
@@ -32,50 +31,7 @@ std::string why_integrated(const MechanismData& d, const SimulationSettings& s) 
   return "";
 }
 
-// Returns whether a gradient in y has a part out of the plane. The part in the plane is rounding: the drives determine
-// the state.
-bool leaves_plane(const MechanismData& d, Eigen::VectorXd y_bar) {
-  const PlanarBodies plane(*d.planar);
-  const StateLayout layout{d.n};
-  for (std::size_t body = 1; body < d.bodies.size(); ++body) {
-    for (const Eigen::Index first : {layout.q(body), layout.v(body)}) {
-      plane.add_vector(-1.0 * plane.vector(y_bar, first), first, y_bar);
-      plane.add_turn(body, -1.0 * plane.turn(body, y_bar, first + 3), first + 3, y_bar);
-    }
-  }
-  return y_bar.any();
-}
-
-// Returns whether a parameter moves a body, or a point of a joint, out of the plane.
-bool moves_out_of_plane(const MechanismData& d) {
-  const PlanarModel& plane = *d.planar;
-  const auto moves = [&](int slot, const auto& normal) {
-    if (slot < 0) return false;
-    constexpr double kRounding = 1e-14;  // of unit axes, in d theta/d rho
-    return (normal.transpose() * d.theta_rho.middleRows(slot, normal.size())).cwiseAbs().maxCoeff() >
-           kRounding * d.theta_rho.middleRows(slot, normal.size()).cwiseAbs().maxCoeff();
-  };
-  for (int i = 1; i <= d.n; ++i) {
-    const BodyData& body = d.bodies[at(i)];
-    const PlanarBody& seen = plane.bodies[at(i)];
-    Eigen::Matrix4d in_plane = seen.p_a * seen.p_a.transpose() + seen.p_b * seen.p_b.transpose();
-    if (moves(body.slot_com, seen.n) || moves(body.slot_velocity, Vec<3>(Vec<3>::Unit(plane.n)))) return true;
-    if (body.slot_angular_velocity >= 0) return true;
-    if (body.slot_q < 0) continue;
-    if (moves(body.slot_q, Vec<3>(Vec<3>::Unit(plane.n)))) return true;
-    const Eigen::Matrix4d out = Eigen::Matrix4d::Identity() - in_plane;
-    for (int k = 0; k < 4; ++k)
-      if (moves(body.slot_q + 3, Vec<4>(out.col(k)))) return true;
-  }
-  return std::ranges::any_of(d.constraints, [&](const Constraint& c) {
-    const Vec<3> n1 = plane.bodies[at(c.body1)].n, n2 = plane.bodies[at(c.body2)].n;
-    return moves(c.slot1, n1) || moves(c.slot2, n2) || moves(c.slot3, n1) || moves(c.slot3, n2);
-  });
-}
-
-// Derivatives of the state in rho at one instant. In space the constraints determine all of the state. In a plane they
-// do not determine the coordinates out of it, which keep their assembled values. So y = P(y0(rho), rho), P the
-// projection.
+// Derivatives of the state in rho at one instant. The constraints determine all of the state that depends on rho.
 class DrivenDerivatives {
  public:
   DrivenDerivatives(const Mechanism& mechanism, DrivenRun& run)
@@ -86,19 +42,20 @@ class DrivenDerivatives {
         blocks_(parameter_blocks(data_)),
         y_bar_(Eigen::VectorXd::Zero(mechanism.states())),
         rho_bar_(Eigen::VectorXd::Zero(data_.rho.size())),
+        y0_bar_(y_bar_),
         y_rho_(Eigen::MatrixXd::Zero(mechanism.states(), data_.rho.size())) {
     y0_dir_.setZero(mechanism.states(), kLanes), direction_ = y0_dir_;
   }
 
-  // Sets y_rho at a point, y0_rho: dy0/drho. Within a singular window it is the sum over its nodes that the state is.
-  // Returns false if J is singular.
-  bool set_y_rho(const StatePoint& at, const Eigen::MatrixXd& y0_rho, bool velocities) {
+  // Sets y_rho at a point. Within a singular window it is the sum over its nodes that the state is. Returns false if J
+  // is singular.
+  bool set_y_rho(const StatePoint& at, bool velocities) {
     const SingularWindow* const w = run_.window_at(at.t);
-    if (!w) return linearise(at) && find_y_rho(y0_rho, velocities);
+    if (!w) return linearise(at) && find_y_rho(velocities);
     tangents_.clear();
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(y_rho_.rows(), y_rho_.cols());
     const bool regular = w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
-      if (!linearise({node.t, node.y, node.angles}) || !find_y_rho(y0_rho, velocities)) return false;
+      if (!linearise({node.t, node.y, node.angles}) || !find_y_rho(velocities)) return false;
       tangents_.push_back(y_rho_);
       sum += weight * y_rho_;
       return true;
@@ -109,11 +66,11 @@ class DrivenDerivatives {
   }
   bool linearise(const StatePoint& at) { return projector_.linearise(at.t, at.angles, at.y, at.y, unmoved_); }
   // Names the parameters in which the positions at the nodes of a window have a pole, in the statistics.
-  void note_parameters(const Eigen::MatrixXd& y0_rho) {
+  void note_parameters() {
     constexpr double kPole = 1e-2;      // of the roughness, far above that of smooth motions
     constexpr double kRounding = 1e-9;  // of the positions: a derivative that moves them less consists of rounding
     for (const SingularWindow& w : run_.windows()) {
-      if (w.nodes.empty() || data_.active.empty() || !set_y_rho({w.t, y_bar_, y_bar_}, y0_rho, false)) continue;
+      if (w.nodes.empty() || data_.active.empty() || !set_y_rho({w.t, y_bar_, y_bar_}, false)) continue;
       Eigen::MatrixXd q_rho(y_rho_.rows() / 2, SingularWindow::kNodes);
       for (const int p : data_.active) {
         for (Eigen::Index k = 0; k < q_rho.cols(); ++k)
@@ -131,32 +88,29 @@ class DrivenDerivatives {
     term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
     psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
   }
-  // Adds the same for all terms of one objective, to the gradients in the assembled state, fields and parameters.
-  void add_backward(std::span<const DrivenTerm> terms, const StatePoint& at, Eigen::VectorXd& y0_bar,
-                    Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
+  // Adds the same for all terms of one objective, to the gradients in the fields and parameters.
+  void add_backward(std::span<const DrivenTerm> terms, const StatePoint& at, Eigen::VectorXd& theta_bar,
+                    Eigen::VectorXd& rho_bar) {
     const SingularWindow* const w = run_.window_at(at.t);
     ContinuedMotion* const motion = run_.continued();
     if (w && motion) motion->y_bars.assign(SingularWindow::kNodes, Eigen::VectorXd::Zero(y_bar_.size()));
     y_bar_.setZero();
     for (const DrivenTerm& term : terms) term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
-    if (!w) return projector_.add_adjoint(y_bar_, y0_bar, theta_bar, rho_bar);
+    if (!w) return projector_.add_adjoint(y_bar_, y0_bar_, theta_bar, rho_bar);
     std::size_t k = 0;
     w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
       Eigen::VectorXd y_bar = weight * y_bar_;
       if (motion) y_bar += motion->y_bars[k++];
       linearise({node.t, node.y, node.angles});
-      projector_.add_adjoint(y_bar, y0_bar, theta_bar, rho_bar);
+      projector_.add_adjoint(y_bar, y0_bar_, theta_bar, rho_bar);
       return true;
     });
   }
 
  private:
-  bool find_y_rho(const Eigen::MatrixXd& y0_rho, bool velocities) {
+  bool find_y_rho(bool velocities) {
     const Eigen::Index rows = velocities ? y_rho_.rows() : y_rho_.rows() / 2;
     for (const ParameterBlock& b : blocks_) {
-      for (int k = 0; k < kLanes; ++k) {
-        if (b.parameter[k] >= 0) y0_dir_.col(k) = y0_rho.col(b.parameter[k]);
-      }
       if (velocities)
         projector_.tangent(b, y0_dir_, direction_);
       else
@@ -175,8 +129,9 @@ class DrivenDerivatives {
   const ProjectionSolution unmoved_;
   std::vector<ParameterBlock> blocks_;
   Eigen::VectorXd y_bar_, rho_bar_;
+  Eigen::VectorXd y0_bar_;  // of the state that is projected, which only rounding reaches
   Eigen::MatrixXd y_rho_;
-  LaneRows y0_dir_, direction_;
+  LaneRows y0_dir_, direction_;  // y0_dir_ is zero: the projected state does not depend on rho
 };
 
 // ydot at a point, within a singular window continued as the state there.
@@ -232,13 +187,11 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   DrivenDerivatives derivatives(mechanism, run);
-  Eigen::MatrixXd y0_rho = Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters());
-  if (run.model() == Model::planar && moves_out_of_plane(mechanism.data())) y0_rho = start.tangent();
   std::optional<SpatialDynamics> dynamics;  // of the rates that observers get
   if (rates == Rates::known) dynamics.emplace(mechanism, settings.formulation);
   Eigen::VectorXd ydot(mechanism.states());
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
-    if (!derivatives.set_y_rho(at, y0_rho, rates != Rates::without_tangents)) return false;
+    if (!derivatives.set_y_rho(at, rates != Rates::without_tangents)) return false;
     ++result.statistics.linearised_states;
     const Eigen::MatrixXd& y_rho = derivatives.y_rho();
     const bool observed = std::ranges::any_of(terms, [](const DrivenTerm& term) { return !term.cost; });
@@ -254,7 +207,7 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
     }
     return y_rho.allFinite();
   });
-  derivatives.note_parameters(y0_rho);
+  derivatives.note_parameters();
   return run.finish();
 }
 
@@ -264,7 +217,6 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
   SimulationResult& result = run.result();
   const MechanismData& d = mechanism.data();
   DrivenDerivatives derivatives(mechanism, run);
-  std::vector<Eigen::VectorXd> y0_bar(costs.size(), Eigen::VectorXd::Zero(mechanism.states()));
   std::vector<Eigen::VectorXd> theta_bar(costs.size(), Eigen::VectorXd::Zero(d.slots()));
   std::vector<Eigen::VectorXd> rho_bar(costs.size(), Eigen::VectorXd::Zero(d.rho.size()));
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
@@ -275,20 +227,15 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
           terms, [&](const DrivenTerm& term) { return term.objective != terms.front().objective; });
       const std::size_t o = static_cast<std::size_t>(terms.front().objective),
                         count = static_cast<std::size_t>(other - terms.begin());
-      derivatives.add_backward(terms.first(count), at, y0_bar[o], theta_bar[o], rho_bar[o]);
+      derivatives.add_backward(terms.first(count), at, theta_bar[o], rho_bar[o]);
       terms = terms.subspan(count);
     }
     return true;
   });
-  derivatives.note_parameters(Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters()));
+  derivatives.note_parameters();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   for (std::size_t o = 0; o < costs.size(); ++o) {
     d.add_to_rho(theta_bar[o], rho_bar[o]);
-    if (run.model() == Model::planar && leaves_plane(d, y0_bar[o])) {
-      Eigen::MatrixXd of_start = rho_bar[o];
-      start.add_adjoint(y0_bar[o], of_start);
-      rho_bar[o] = of_start;
-    }
     result.psi_rho.row(static_cast<Eigen::Index>(o)) = rho_bar[o].transpose();
   }
   return run.finish();

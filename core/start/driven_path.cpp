@@ -149,16 +149,15 @@ bool DrivenPath::step(double h, double t1) {
   return true;
 }
 
-bool DrivenPath::go_to(double t1, double shortest, long most, const std::function<bool()>& goes_on) {
+bool DrivenPath::go_to(double t1, double shortest, long most) {
   double h = t1 - state_.t;
   const long last_step = steps_ + most;
   while (state_.t < t1) {
-    if (steps_ >= last_step || (goes_on && !goes_on())) return false;
+    if (steps_ >= last_step) return false;
     const double left = t1 - state_.t;
     h = std::min({h, left, step_limit()});
     const bool last = h >= left * (1 - 1e-12);
     if (advance(h, last ? t1 : state_.t + h)) {
-      ++accepted_;
       h *= 2;
     } else {
       h /= 2;

@@ -42,16 +42,14 @@ class DrivenPath {
   void start(double t, double end, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
   void start(const DrivenState& state) { state_ = state; }
   const DrivenState& state() const { return state_; }
-  // Replaces the state by a more exact solution at the same time.
-  void improve(const Eigen::VectorXd& y) { state_.y = y; }
 
   // The longest step that the velocities allow.
   double step_limit() const;
   // Takes one step by h, to t1 = t + h. Returns false if it is refused; the path then keeps its state.
   bool advance(double h, double t1);
-  // Takes as many steps as the branch needs. Returns false if they become shorter than `shortest`, or more than `most`,
-  // or if `goes_on` returns false before one of them. The path then keeps the last accepted state.
-  bool go_to(double t1, double shortest, long most, const std::function<bool()>& goes_on = {});
+  // Takes as many steps as the branch needs. Returns false if they become shorter than `shortest`, or more than `most`.
+  // The path then keeps the last accepted state.
+  bool go_to(double t1, double shortest, long most);
 
   // Returns whether rounding of the state grows so much that its multipliers lose more than 4 digits.
   bool is_uncertain() const { return state_.regularity < 1e-3 * most_regular_ && !window_at(state_.t); }
@@ -67,8 +65,7 @@ class DrivenPath {
   double velocity_violation() { return window_at(state_.t) ? 0 : projector_->velocity_violation(state_.t, state_.y); }
   // Serves derivatives at a state. The path keeps nothing in it between its steps.
   Projector& projector() { return *projector_; }
-  long steps() const { return steps_; }        // solved, also those of windows
-  long accepted() const { return accepted_; }  // by go_to()
+  long steps() const { return steps_; }  // solved, also those of windows
   long factorisations() const { return projector_->factorisations(); }
 
  private:
@@ -89,7 +86,7 @@ class DrivenPath {
   double most_regular_ = 0;              // so far
   std::vector<SingularWindow> windows_;  // ascending
   Eigen::VectorXd y_hat_, y_next_, response_;
-  long steps_ = 0, accepted_ = 0;
+  long steps_ = 0;
 };
 
 }  // namespace mbsopt

@@ -1,11 +1,8 @@
 #include "core/start/poses.hpp"
 
-#include <cmath>
-
 #include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
-#include "core/dynamics/constraint_terms.hpp"
 
 namespace mbsopt {
 
@@ -64,30 +61,6 @@ VectorXd JointSolver::solve_transposed(const VectorXd& f) const {
 }
 VectorXd JointSolver::transposed_times(const VectorXd& x) const {
   return rows_.J.transpose() * x.cwiseQuotient(rows_.scale);
-}
-
-double close_joints(const MechanismData& d, double t, const VectorXd& angles, double threshold, VectorXd& y) {
-  constexpr int kMost = 10;
-  constexpr double kRounding = 1e-15;
-  const StateLayout layout{d.n};
-  RowLaws laws(d);
-  laws.set_time(t);
-  VectorXd phi(d.m);
-  double before = INFINITY;
-  for (int k = 0;; ++k) {
-    for (int i = 1; i <= d.n; ++i) {
-      auto p = y.segment<4>(layout.p(i)), pdot = y.segment<4>(layout.pdot(i));
-      p.normalize();
-      pdot -= p * p.dot(pdot);
-    }
-    const std::vector<Frame> frames = BodiesAt(y).frames;
-    ConstraintTerms(d).phi(frames, laws, angles, phi);
-    const double now = phi.size() > 0 ? phi.cwiseAbs().maxCoeff() : 0;
-    if (k == kMost || now < kRounding || !(now < 0.9 * before)) return now;
-    before = now;
-    auto q = y.head(layout.positions());
-    q += rates_of_poses(q, JointSolver(d, frames, threshold).solve(-phi));
-  }
 }
 
 }  // namespace mbsopt

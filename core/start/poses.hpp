@@ -50,8 +50,4 @@ class JointSolver {
   OrthogonalDecomposition factor_;
 };
 
-// Moves the positions of y onto Phi(q, t) = 0 by Newton steps of least size, from near by. Returns |Phi| there.
-double close_joints(const MechanismData& data, double t, const Eigen::VectorXd& angles, double threshold,
-                    Eigen::VectorXd& y);
-
 }  // namespace mbsopt

@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/driven/kinematics.hpp"
 #include "core/dynamics/constraint_rows.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/force/user_force.hpp"
 #include "core/scene/kinematic_scene.hpp"
 #include "core/simulate/simulation.hpp"
 #include "core/start/assembly.hpp"
-#include "core/start/kinematics.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 
 using namespace mbsopt;
@@ -161,7 +161,7 @@ TEST_CASE("MBSVT: setDOF, position_, velocity_ and acceleration_kinematics", "[m
   const Mechanism mechanism(kinematic_scene(scene, issues), kRho);
   REQUIRE(issues.empty());
   int seen = 0;
-  const KinematicsResult result = solve_kinematics(
+  const SimulationResult result = solve_kinematics(
       mechanism, Assembly(mechanism, 0), scene.simulation, {0, 0.3, 1.1}, [&](std::size_t, const StatePoint& at) {
         const SliderMotion expected(0.4 + 3 * at.t, 3);
         CHECK(mechanism.sensor_value(mechanism.sensor("x"), at) == Approx(expected.x).epsilon(1e-12));
@@ -171,7 +171,7 @@ TEST_CASE("MBSVT: setDOF, position_, velocity_ and acceleration_kinematics", "[m
         return true;
       });
   INFO(result.message);
-  CHECK(result.ok);
+  CHECK(result.ok());
   CHECK(seen == 3);
 }
 
@@ -242,7 +242,7 @@ TEST_CASE("MBSVT: STATE::pos, vel, ace: a drive follows a routine in C++", "[mbs
   const Mechanism mechanism(scene, kRho);
   const double omega = 10 * kRho(0);
   int seen = 0;
-  const KinematicsResult result = solve_kinematics(
+  const SimulationResult result = solve_kinematics(
       mechanism, Assembly(mechanism, 0), scene.simulation, {0, 0.4, 1.1}, [&](std::size_t, const StatePoint& at) {
         const double angle = omega * at.t;
         CHECK(mechanism.sensor_value(mechanism.sensor("x"), at) == Approx(cam(angle, 0)).margin(1e-13));

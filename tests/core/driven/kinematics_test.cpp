@@ -1,4 +1,4 @@
-#include "core/start/kinematics.hpp"
+#include "core/driven/kinematics.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -60,7 +60,7 @@ TEST_CASE("a driven slider-crank follows its closed form over two turns, torque 
   scene.sensors.push_back(effort);
   const Mechanism mechanism(scene, VectorXd());
   double worst_x = 0, worst_v = 0, worst_a = 0, worst_T = 0;
-  const KinematicsResult result = solve_kinematics(
+  const SimulationResult result = solve_kinematics(
       mechanism, Assembly(mechanism, 0), {}, times(4 * std::numbers::pi / kSpeed, 97),
       [&](std::size_t, const StatePoint& at) {
         const double th = kSpeed * at.t, s = kCrank * std::sin(th), c = kCrank * std::cos(th);
@@ -77,12 +77,12 @@ TEST_CASE("a driven slider-crank follows its closed form over two turns, torque 
         return true;
       });
   INFO(result.message);
-  REQUIRE(result.ok);
+  REQUIRE(result.ok());
   CHECK(worst_x < 1e-13);
   CHECK(worst_v < 1e-12);
   CHECK(worst_a < 1e-10);
   CHECK(worst_T < 1e-7);  // the bars' own 1e-9 kg
-  CHECK(result.max_position_violation < 1e-13);
+  CHECK(result.statistics.max_position_violation < 1e-13);
 }
 
 TEST_CASE("a condition holds the degree of freedom that no drive holds", "[kinematics]") {
@@ -94,22 +94,22 @@ TEST_CASE("a condition holds the degree of freedom that no drive holds", "[kinem
   CHECK(issues.empty());
   const Mechanism mechanism(prescribed, VectorXd());
   double last = 0;
-  const KinematicsResult result =
+  const SimulationResult result =
       solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 4), [&](std::size_t, const StatePoint& at) {
         last = mechanism.sensor_value(mechanism.sensor("theta"), at);
         return true;
       });
   INFO(result.message);
-  REQUIRE(result.ok);
+  REQUIRE(result.ok());
   CHECK(last == Approx(2.3).epsilon(1e-13));
 }
 
 TEST_CASE("what is not driven is said", "[kinematics]") {
   const Scene scene = slider_crank();
   const Mechanism mechanism(scene, VectorXd());
-  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2),
-                                                   [](std::size_t, const StatePoint&) { return true; });
-  CHECK_FALSE(result.ok);
+  const SimulationResult result =
+      solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2), [](std::size_t, const StatePoint&) {});
+  CHECK_FALSE(result.ok());
   CHECK_THAT(result.message, Catch::Contains("1 degree of freedom: 'crank', 'rod', 'slider' move together"));
 }
 
@@ -117,10 +117,10 @@ TEST_CASE("a drive too fast for the steps that are allowed fails at once, in wor
   Scene scene = slider_crank();
   scene.drives.push_back(angle_drive("A", "1e19*t"));
   const Mechanism mechanism(scene, VectorXd());
-  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2),
-                                                   [](std::size_t, const StatePoint&) { return true; });
-  CHECK_FALSE(result.ok);
-  CHECK(result.steps == 0);
+  const SimulationResult result =
+      solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2), [](std::size_t, const StatePoint&) {});
+  CHECK_FALSE(result.ok());
+  CHECK(result.statistics.steps == 0);
   CHECK_THAT(result.message, Catch::Contains("max_steps"));
 }
 
@@ -128,10 +128,10 @@ TEST_CASE("kinematics stops between two times that are wanted, too", "[kinematic
   Scene scene = slider_crank();
   scene.drives.push_back(angle_drive("A", "100*t"));
   const Mechanism mechanism(scene, VectorXd());
-  const KinematicsResult result = solve_kinematics(
-      mechanism, Assembly(mechanism, 0), {}, times(1, 2), [](std::size_t, const StatePoint&) { return true; },
+  const SimulationResult result = solve_kinematics(
+      mechanism, Assembly(mechanism, 0), {}, times(1, 2), [](std::size_t, const StatePoint&) {},
       [](double t) { return t < 0.5; });
-  CHECK_FALSE(result.ok);
+  CHECK_FALSE(result.ok());
   CHECK_THAT(result.message, Catch::Contains("stopped at t = 0.5"));
 }
 
@@ -142,9 +142,9 @@ TEST_CASE("a drive that cannot pass a dead point fails with the time and the joi
   push.law = f("0.8 + 0.2*t");  // 0.9: stretched
   scene.drives.push_back(push);
   const Mechanism mechanism(scene, VectorXd());
-  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 10),
-                                                   [](std::size_t, const StatePoint&) { return true; });
-  CHECK_FALSE(result.ok);
+  const SimulationResult result =
+      solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 10), [](std::size_t, const StatePoint&) {});
+  CHECK_FALSE(result.ok());
   CHECK(result.last_good_time == Approx(0.5).margin(0.11));
   CHECK_THAT(result.message, Catch::Contains("cannot be continued"));
 }
@@ -167,13 +167,13 @@ TEST_CASE("a parallelogram passes its flat positions on its branch, and they are
   scene.sensors.push_back(point_sensor("y0", "position", "bar", vec("0", "0", "0"), "y"));
   const Mechanism mechanism(scene, VectorXd());
   double tilt = 0;
-  const KinematicsResult result =
+  const SimulationResult result =
       solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(6, 25), [&](std::size_t, const StatePoint& at) {
         tilt = std::max(tilt, std::abs(mechanism.sensor_value(0, at) - mechanism.sensor_value(1, at)));
         return true;
       });
   INFO(result.message);
-  REQUIRE(result.ok);
+  REQUIRE(result.ok());
   CHECK(tilt < 1e-9);  // the other branch would tilt the bar
 }
 
@@ -205,14 +205,14 @@ double error_beside_a_dead_point(double crank, double rod, double gap, double sp
   s.sensors.push_back(angle_sensor("theta", "A"));
   const Mechanism mechanism(s, VectorXd());
   double worst = 0;
-  const KinematicsResult result = solve_kinematics(
+  const SimulationResult result = solve_kinematics(
       mechanism, Assembly(mechanism, 0), {}, times(0.5 * crank / speed, rows), [&](std::size_t, const StatePoint& at) {
         const double th = crank_angle(x0 + away * speed * at.t);
         worst = std::max(worst, std::abs(mechanism.sensor_value(0, at) - th));
         return true;
       });
   INFO(result.message);
-  CHECK(result.ok);
+  CHECK(result.ok());
   return worst;
 }
 
@@ -231,9 +231,9 @@ TEST_CASE("kinematics refuses a drive whose rate jumps in the words of a simulat
   scene.drives.push_back(angle_drive("A", "0.3 + 2*abs(t - 0.237)"));
   scene.simulation.end_time = 0.5;
   const Mechanism mechanism(scene, VectorXd());
-  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), scene.simulation, times(0.5, 50),
-                                                   [](std::size_t, const StatePoint&) { return true; });
-  CHECK_FALSE(result.ok);
+  const SimulationResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), scene.simulation, times(0.5, 50),
+                                                   [](std::size_t, const StatePoint&) {});
+  CHECK_FALSE(result.ok());
   CHECK_THAT(result.message, Catch::Contains("changes its rate by 4 1/s at once at t = 0.237 s"));
   CHECK(result.last_good_time == Approx(0.23));
   CHECK(simulate(mechanism, scene.simulation).message == result.message);
@@ -243,9 +243,9 @@ TEST_CASE("kinematics of a body that no joint holds is refused", "[kinematics]")
   Scene scene;
   scene.bodies.push_back(plain_body("stone", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
   const Mechanism mechanism(scene, VectorXd());
-  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2),
-                                                   [](std::size_t, const StatePoint&) { return true; });
-  CHECK_FALSE(result.ok);
+  const SimulationResult result =
+      solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2), [](std::size_t, const StatePoint&) {});
+  CHECK_FALSE(result.ok());
   CHECK_THAT(result.message, Catch::Contains("6 degrees of freedom"));
 }
 
@@ -270,7 +270,7 @@ TEST_CASE("conditions with an acceleration hold a degree of freedom, and so do E
     return true;
   };
   const std::vector<double> when = times(1.2, 6);
-  CHECK(solve_kinematics(driven, Assembly(driven, 0), scene.simulation, when, check).ok);
+  CHECK(solve_kinematics(driven, Assembly(driven, 0), scene.simulation, when, check).ok());
   REQUIRE(positions.size() == when.size());
 
   // e3 = sin(angle/2) as the coordinate of the crank, at a constant rate
@@ -288,7 +288,7 @@ TEST_CASE("conditions with an acceleration hold a degree of freedom, and so do E
     ++seen;
     return true;
   };
-  CHECK(solve_kinematics(by_parameter, Assembly(by_parameter, 0), scene.simulation, times(0.6, 4), follow).ok);
+  CHECK(solve_kinematics(by_parameter, Assembly(by_parameter, 0), scene.simulation, times(0.6, 4), follow).ok());
   CHECK(seen == 5);
 
   scene.conditions = {{"theta", f("0.4"), f("3"), f("-2")}};
