@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/math/interpolators/barycentric_rational.hpp>
 #include <cmath>
 
 #include "core/body/hermite.hpp"
@@ -280,6 +281,14 @@ double DrivenRun::allowed_error(std::size_t r, double h) const {
 bool DrivenRun::hides_a_peak(double h) {
   const double apart =
       std::min(kApart * (settings_.end_time - settings_.start_time), settings_.integrator.max_step.value_or(INFINITY));
+  const auto& c = kronrod_rule().nodes;
+  std::vector<boost::math::barycentric_rational<double>> P;  // of the highest order: polynomials through all nodes
+  std::vector<double> sizes;                                 // of the running costs
+  for (std::size_t r = 0; r < running_.size(); ++r) {
+    std::vector<double> x(c.begin(), c.end()), g(&g_[r * kNodes], &g_[r * kNodes] + kNodes);
+    sizes.push_back(std::abs(*std::ranges::max_element(g, {}, [](double v) { return std::abs(v); })));
+    P.emplace_back(std::move(x), std::move(g), kNodes - 1);
+  }
   for (std::size_t k = 1; k < nodes_.size(); ++k) {
     const DrivenState &a = nodes_[k - 1], &b = nodes_[k];
     const double gap = b.t - a.t, parts = std::ceil(gap / apart);
@@ -287,16 +296,9 @@ bool DrivenRun::hides_a_peak(double h) {
       const double t = a.t + j / parts * gap;
       hermite(a.y, b.y, gap, j / parts, y_);
       const StatePoint between{t, y_, a.angles, continued()};
-      const std::array<double, kNodes> P = polynomial_at((t - from_.t) / h);
       for (std::size_t r = 0; r < running_.size(); ++r) {
-        const double g = running_[r].cost->value(between);
-        double expected = 0, size = std::abs(g);
-        for (std::size_t i = 0; i < kNodes; ++i) {
-          expected += P[i] * g_[r * kNodes + i];
-          size = std::max(size, std::abs(g_[r * kNodes + i]));
-        }
-        const double D = std::abs(g - expected);
-        if (D > kPeak * size && D * gap / parts > allowed_error(r, h)) return true;
+        const double g = running_[r].cost->value(between), D = std::abs(g - P[r]((t - from_.t) / h));
+        if (D > kPeak * std::max(sizes[r], std::abs(g)) && D * gap / parts > allowed_error(r, h)) return true;
       }
     }
   }

@@ -26,26 +26,6 @@ const KronrodRule& kronrod_rule() {
   return rule;
 }
 
-// The barycentric formula: weights w_k/(x - x_k) over their sum, 1/w_k = prod_{j != k} (x_k - x_j). Berrut, Trefethen,
-// "Barycentric Lagrange interpolation", SIAM Review 46 (2004), eq. (4.2).
-std::array<double, kNodes> polynomial_at(double x) {
-  static const std::array<double, kNodes> w = [] {
-    std::array<double, kNodes> weights;
-    const auto& nodes = kronrod_rule().nodes;
-    for (std::size_t k = 0; k < kNodes; ++k) {
-      weights[k] = 1;
-      for (std::size_t j = 0; j < kNodes; ++j)
-        if (j != k) weights[k] /= nodes[k] - nodes[j];
-    }
-    return weights;
-  }();
-  std::array<double, kNodes> P;
-  double sum = 0;
-  for (std::size_t k = 0; k < kNodes; ++k) sum += P[k] = w[k] / (x - kronrod_rule().nodes[k]);
-  for (double& weight : P) weight *= 1 / sum;
-  return P;
-}
-
 // QUADPACK, section 2.2.4.1: with D the integral of |g - mean|, error = D min(1, (200 |K - G|/D)^1.5).
 PanelIntegral integrate_panel(std::span<const double> g, double h) {
   const KronrodRule& rule = kronrod_rule();

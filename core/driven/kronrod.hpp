@@ -15,9 +15,6 @@ struct KronrodRule {
 };
 const KronrodRule& kronrod_rule();
 
-// The weights of g at the nodes in P(x), the polynomial of degree 14 through them. x in (0, 1) is no node.
-std::array<double, kNodes> polynomial_at(double x);
-
 // An integral over a panel of length h, from g at the nodes.
 struct PanelIntegral {
   double value = 0;     // K

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/driven/kronrod.hpp"
 #include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
@@ -55,15 +54,6 @@ std::vector<Cost> work_of(const Mechanism& m) {
 }
 
 }  // namespace
-
-TEST_CASE("the weights of the polynomial through Kronrod's nodes reproduce degree 14", "[kronrod]") {
-  for (const double x : {0.001, 0.3217, 0.52, 0.99}) {
-    const std::array<double, kNodes> P = polynomial_at(x);
-    double value = 0;
-    for (std::size_t k = 0; k < kNodes; ++k) value += P[k] * std::pow(kronrod_rule().nodes[k] - 0.4, 14);
-    CHECK(value == Approx(std::pow(x - 0.4, 14)).margin(1e-14));
-  }
-}
 
 TEST_CASE("a solved run integrates a peak at any instant", "[driven]") {
   Scene scene = ram("0.1*t");
