@@ -265,9 +265,9 @@ double ForwardRun::stop_before_pulse(double t, PulseWatch& pulses) {
     y_change_ = duration * (flow_.ydot() - y_change_);
     return scaled_norm(y_change_, y_now_, y_now_, tolerances_);
   };
-  bool shorter = false;
-  while (h > shortest && pulses.worst(t, h, true, change).error > PulseWatch::kMissed) h /= 2, shorter = true;
-  return shorter ? t + h : end;
+  const double given = h;
+  while (h > shortest && pulses.worst(t, h, true, change).error > PulseWatch::kMissed) h /= 2;
+  return h < given ? t + h : end;
 }
 
 // One internal step from t to t1. Returns false, with the reason in the result, if there is none.

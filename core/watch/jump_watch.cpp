@@ -15,11 +15,11 @@ namespace {
 constexpr double kApart = 1e-6;    // of the run: times and states have digits for distances within it
 constexpr double kMiddle = 0.471;  // not half: jumps are at round times
 constexpr double kFar = 1e-2, kNear = 1e-4, kNearest = 1e-6;  // from the zero, of the interval
-constexpr double kKept = 0.5;        // of the far difference by the near one: |x|^0.15 keeps it, a kink 0.01
+constexpr double kRetained = 0.5;    // of the far difference by the near one: |x|^0.15 keeps it, a kink 0.01
 constexpr double kLeastJump = 1e-6;  // of the value: cancellation next to sin(x)/x is less
 constexpr int kBisections = 60;      // to the rounding of theta
 constexpr double kLeastBend = 1e-6;  // change of slope over a step, of the value
-constexpr double kRoot = 0.05;       // as kKept: x^1.5 from a contact on keeps 0.1 of its bend, x^2 0.01
+constexpr double kRoot = 0.05;       // as kRetained: x^1.5 from a contact on keeps 0.1 of its bend, x^2 0.01
 constexpr double kTurn = 0.1;        // away from its chord, of the change over a step
 constexpr int kMostTries = 100;      // of switches at which nothing jumps
 
@@ -143,7 +143,7 @@ bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
   };
   const Change far = change(kFar), near = change(kNear), nearest = change(kNearest);  // a narrow peak hides from far
   const bool jumps =
-      near.jump > kLeastJump * size && near.jump >= kKept * far.jump && nearest.jump >= kKept * near.jump;
+      near.jump > kLeastJump * size && near.jump >= kRetained * far.jump && nearest.jump >= kRetained * near.jump;
   const bool kink = near.bend > kLeastBend * size && near.bend >= kRoot * far.bend;
   // A smooth function may turn within the interval, too, so that stages do not resolve its slope.
   const double f0 = value(f, *f.program, 0), f1 = value(f, *f.program, 1);

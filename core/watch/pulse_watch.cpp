@@ -9,9 +9,8 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kShareOfLaw =
-    0.02;  // of E: a law is smooth but for its pulses, so more doubts than of records cost little
-constexpr std::size_t kFewest = 3;  // instants: fewer bound no pulse
+constexpr double kShareOfLaw = 0.02;  // of E: a law is smooth but for its pulses, so more tests cost little
+constexpr std::size_t kFewest = 3;    // instants: fewer bound no pulse
 
 // The slope of the parabola through three samples, at the middle one; at ends that of the line.
 double slope_at(const std::vector<double>& x, const std::vector<double>& y, std::size_t i) {
@@ -99,7 +98,7 @@ PulseWatch::Integrals PulseWatch::integrals_to(const Function& f, double t) {
   return {f.until[low].f + sign * rest.f, f.until[low].ft + sign * rest.ft};
 }
 
-PulseWatch::Doubt PulseWatch::doubt(Function& f, double t, double h, bool noticed) {
+PulseWatch::Candidate PulseWatch::candidate(Function& f, double t, double h, bool noticed) {
   while (f.next < f.size() && f.t(f.next) <= t) ++f.next;
   if (f.next + 1 >= f.size() || f.t(f.next + 1) >= t + h) return {};  // no piece lies inside
   if (f.until.empty()) integrate(f);
@@ -134,7 +133,7 @@ PulseWatch::Doubt PulseWatch::doubt(Function& f, double t, double h, bool notice
 Pulse PulseWatch::worst(double t, double h, bool noticed, const Change& change) {
   Pulse worst;
   for (Function& f : functions_) {
-    const Doubt d = doubt(f, t, h, noticed);
+    const Candidate d = candidate(f, t, h, noticed);
     if (!(d.duration > 0)) continue;
     const double error = d.share > 0 ? d.share / rtol_ : change(d.at, d.beside, d.duration);
     if (!(error > worst.error)) continue;

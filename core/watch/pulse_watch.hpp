@@ -5,10 +5,11 @@
 // The step takes sums over its nodes instead, Q = h sum_i b_i f(t + c_i h) and R = h sum_i b_i (1 - c_i) f(t + c_i h).
 //   D = max(|I - Q|, |J - R|)   what the step misses: at its end, and in the mean, as of a fast step of a drive
 //   E = h |sum_i e_i f_i|       what its nodes notice, by the null rule (quadrature_watch.hpp)
-// If D > E, or |I - Q| > 0.02 E of a law, the step is in doubt. Let f differ most from Q/h at t*, and less than half as
-// much at t'. The accelerations a at both instants, in one state, say how much the velocities miss:  D (a(t*) - a(t'))/
-// (f(t*) - f(t')). So a rough record costs nothing where nodes notice it, and a pulse below the tolerances costs two
-// evaluations. A running cost misses D itself.
+// If D > E, or |I - Q| > 0.02 E of a law, the step may pass over a pulse. Let f differ most from Q/h at t*, and less
+// than half as much at t'. The accelerations a at both instants, in one state, give what the velocities miss:
+//   D (a(t*) - a(t'))/(f(t*) - f(t'))
+// So a rough record costs nothing where nodes notice it, and a pulse below the tolerances costs two evaluations. A
+// running cost misses D itself.
 //
 //   PulseWatch watch(mechanism, costs, start, end, rtol, pulse_nodes(method));
 //   if (watch.worst(t, h, true, change).error > PulseWatch::kMissed) // try a shorter step
@@ -55,9 +56,9 @@ class PulseWatch {
     TimedLaw law;  // or samples
     std::shared_ptr<const Curve> curve;
     double delay = 0;
-    std::vector<Integrals> until;  // each instant, from the first doubt on
+    std::vector<Integrals> until;  // each instant, from the first test on
     std::size_t next = 0;          // the first instant after the step's start
-    double largest = 0;            // D of a doubt, where nothing rejects it
+    double largest = 0;            // D so far, where nothing rejects it
     double of_size = 0;            // the integral of |f|
 
     std::size_t size() const { return curve ? curve->x().size() : law.pieces.size(); }
@@ -67,12 +68,12 @@ class PulseWatch {
   Integrals integrals(const Function& f, double from, double to);  // where f is smooth
   Integrals integrals_to(const Function& f, double t);
   void integrate(Function& f);
-  struct Doubt {
+  struct Candidate {            // a pulse that a step may pass over
     double at = 0, beside = 0;  // t* and t' [s]
-    double duration = 0;        // D/|f(t*) - f(t')|  [s]; 0: there is no doubt
+    double duration = 0;        // D/|f(t*) - f(t')|  [s]; 0: there is none
     double share = 0;           // D of the integral of |f| over the run: of a running cost, else 0
   };
-  Doubt doubt(Function& f, double t, double h, bool noticed);
+  Candidate candidate(Function& f, double t, double h, bool noticed);
 
   const double rtol_;
   const std::vector<QuadratureNode> nodes_;
