@@ -13,34 +13,14 @@ constexpr std::size_t kLeastSteps = 2, kLeastSnapshots = 8;  // below these no b
 
 std::size_t bytes_of(const StoredStep& step) { return step.bytes() + kStepBlocks * kBlock; }
 
-// (s + r)!/(s! r!), no more than `most`; 0 for r < 0.
-long beta(long s, long r, long most) {
-  if (r < 0) return 0;
-  double value = 1;  // exact as long as it counts
-  for (long i = 1; i <= std::min(s, r); ++i) {
-    value = value * static_cast<double>(std::max(s, r) + i) / static_cast<double>(i);
-    if (value >= static_cast<double>(most)) return most;
-  }
-  return static_cast<long>(value + 0.5);
-}
-
-long repetitions(long blocks, long snapshots) {
-  long r = 0;
-  while (beta(snapshots, r, blocks) < blocks) ++r;
-  return r;
-}
-
 }  // namespace
 
-// Optimal where  beta(s, r-2) <= m <= beta(s, r-1)  and  beta(s-1, r-1) <= N - m <= beta(s-1, r).
+// With r the least number such that beta(s, r) >= N, the optimal m are about N beta(s, r - 1)/beta(s, r) = N r/(s + r).
 long binomial_split(long blocks, long snapshots) {
-  const long r = repetitions(blocks, snapshots);
-  return std::min(beta(snapshots, r - 1, blocks), blocks - beta(snapshots - 1, r - 1, blocks));
-}
-
-long binomial_cost(long blocks, long snapshots) {
-  const long r = repetitions(blocks, snapshots), most = r * blocks;
-  return r * blocks - beta(snapshots + 1, r - 1, most);
+  long r = 0;
+  for (double beta = 1; beta < static_cast<double>(blocks); ++r)
+    beta *= static_cast<double>(snapshots + r + 1) / static_cast<double>(r + 1);
+  return std::clamp(blocks * r / (snapshots + r), 1L, blocks - 1);
 }
 
 Checkpoints::Checkpoints(const Method& method, double budget_mib)

@@ -6,8 +6,8 @@
 // between by the binomial rule. The steps are those of the forward run, bit for bit, so that derivatives do not depend
 // on the budget.
 //
-//   N blocks of steps are reversed from s snapshots (the one at their start included) with the least number of block
-//   evaluations beside those that keep steps, t(N, s) = r N - beta(s + 1, r - 1), beta(s, r) = (s + r)!/(s! r!), r the
+//   N blocks of steps are reversed from s snapshots (the one at their start included) with nearly the least number of
+//   block evaluations beside those that keep steps, r N - beta(s + 1, r - 1), beta(s, r) = (s + r)!/(s! r!), r the
 //   least with beta(s, r) >= N:  Griewank, Walther, "Algorithm 799: revolve", ACM TOMS 26 (2000).
 #pragma once
 
@@ -26,9 +26,8 @@ struct Snapshot {
   Eigen::VectorXd y0, angles;
 };
 
-// Where to place the next snapshot: after how many of N >= 2 blocks, with s snapshots in all. And t(N, s).
+// Where to place the next snapshot: after how many of N >= 2 blocks, with s snapshots in all.
 long binomial_split(long blocks, long snapshots);
-long binomial_cost(long blocks, long snapshots);
 
 class Checkpoints {
  public:
