@@ -4,6 +4,7 @@
 #pragma once
 
 #include "core/body/complex.hpp"
+#include "core/body/jet.hpp"
 
 namespace mbsopt {
 
@@ -42,18 +43,16 @@ inline void fold_virtual(const PlanarFrame<double>& f, PlanarFrameBar& bar) {
   bar.A -= f.theta_eta * times_i(bar.A_eta);
 }
 
-// Cotangents of x, xd, xdd of a vector or separation, and of its virtual change.
-struct PlanarJetBar {
-  Plane x, xd, xdd, eta;
-};
-inline void add_vector_bar(const PlanarFrame<double>& f, const Plane& s, const PlanarJetBar& bar, double sign,
+// Add the cotangents of a vector A s, or of a point, to the frame and to s.
+inline void add_vector_bar(const PlanarFrame<double>& f, const Plane& s, const MovedJet<Plane>& bar, double sign,
                            PlanarFrameBar& frame_bar, Plane& s_bar) {
   const Plane st = conj(sign * s);
   frame_bar.A += bar.x * st, frame_bar.Adot += bar.xd * st, frame_bar.Addot += bar.xdd * st;
-  frame_bar.A_eta += bar.eta * st;
-  s_bar += sign * (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd + conj(f.turned(f.A)) * bar.eta);
+  frame_bar.A_eta += bar.x_eta * st;
+  s_bar +=
+      sign * (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd + conj(f.turned(f.A)) * bar.x_eta);
 }
-inline void add_point_bar(const PlanarFrame<double>& f, const Plane& s, const PlanarJetBar& bar, double sign,
+inline void add_point_bar(const PlanarFrame<double>& f, const Plane& s, const MovedJet<Plane>& bar, double sign,
                           PlanarFrameBar& frame_bar, Plane& s_bar) {
   frame_bar.r += sign * bar.x;
   frame_bar.rdot += sign * bar.xd;

@@ -9,9 +9,7 @@
 namespace mbsopt {
 
 // A body-fixed vector x = A s along the motion and under a virtual displacement.
-struct VectorJet : Jet<Vector3d> {
-  Vector3d x_eta;
-};
+using VectorJet = MovedJet<Vector3d>;
 inline VectorJet vector_of(const Frame& f, const Vector3d& s) { return {turned(f, s), f.A_eta * s}; }
 inline VectorJet separation_of(const Frame& f1, const Frame& f2, const Vector3d& s1, const Vector3d& s2) {
   return {separation(f1, f2, s1, s2), f2.point_eta(s2) - f1.point_eta(s1)};
@@ -36,12 +34,7 @@ inline void add_point_bar(const Frame& f, const Vector3d& s, const VectorJet& ba
   add_vector_bar(f, s, bar, sign, frame_bar, s_bar);
 }
 
-// Cotangent of x in  lambda (x'y)_eta + mu0 x'y + mu1 (x'y)dot + mu2 (x'y)ddot.
-inline VectorJet product_bar(const VectorJet& y, const Multipliers<1>& z) {
-  const double lambda = z.lambda(0), mu0 = z.mu0(0), mu1 = z.mu1(0), mu2 = z.mu2(0);
-  return {{lambda * y.x_eta + mu0 * y.x + mu1 * y.xd + mu2 * y.xdd, mu1 * y.x + 2 * mu2 * y.xd, mu2 * y.x},
-          lambda * y.x};
-}
+inline RowWeights weights(const Multipliers<1>& z) { return {z.lambda(0), z.mu0(0), z.mu1(0), z.mu2(0)}; }
 
 // The vectors of a primitive.
 template <class S>

@@ -26,8 +26,8 @@ template struct SingleRow<Dot1>;
 void Dot1::pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
                      GeometryBar& s) const {
   const VectorJet x = vector_of(f1, s1), y = vector_of(f2, s2);
-  add_vector_bar(f1, s1, product_bar(y, z), 1, bar1, s.s1);
-  add_vector_bar(f2, s2, product_bar(x, z), 1, bar2, s.s2);
+  add_vector_bar(f1, s1, product_bar(y, weights(z)), 1, bar1, s.s1);
+  add_vector_bar(f2, s2, product_bar(x, weights(z)), 1, bar2, s.s2);
 }
 
 void Dot1::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,

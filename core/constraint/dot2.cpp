@@ -13,8 +13,8 @@ template struct SingleRow<Dot2>;
 
 void Dot2::pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
                      GeometryBar& s) const {
-  const VectorJet w = vector_of(f1, s3), d = separation_of(f1, f2, s1, s2), d_bar = product_bar(w, z);
-  add_vector_bar(f1, s3, product_bar(d, z), 1, bar1, s.s3);
+  const VectorJet w = vector_of(f1, s3), d = separation_of(f1, f2, s1, s2), d_bar = product_bar(w, weights(z));
+  add_vector_bar(f1, s3, product_bar(d, weights(z)), 1, bar1, s.s3);
   add_point_bar(f2, s2, d_bar, 1, bar2, s.s2);
   add_point_bar(f1, s1, d_bar, -1, bar1, s.s1);
 }

@@ -65,18 +65,12 @@ T phi_of(Order order, const PlanarConstraint& c, const PlanarFrame<T>& f1, const
   return T(0);
 }
 
-// J' of a single row.
-template <class T>
-struct RowColumn {
-  Complex<T> force1, force2;
-  T moment1 = 0, moment2 = 0;
-};
 template <class T, class S>
-RowColumn<T> column_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2,
-                       const Vectors<S>& s) {
+PlanarColumn<T> column_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2,
+                          const Vectors<S>& s) {
   using std::sqrt;
   const auto along = [&](const Complex<T>& u) {  // u'd
-    return RowColumn<T>{-u, u, -cross(f1.A * s.s1, u), cross(f2.A * s.s2, u)};
+    return PlanarColumn<T>{-u, u, -cross(f1.A * s.s1, u), cross(f2.A * s.s2, u)};
   };
   switch (c.kind) {
     case Kind::dot1: {
@@ -85,7 +79,7 @@ RowColumn<T> column_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, cons
     }
     case Kind::dot2: {
       const Complex<T> u = f1.A * s.s3;
-      RowColumn<T> column = along(u);
+      PlanarColumn<T> column = along(u);
       column.moment1 = column.moment1 + cross(u, separation(f1, f2, s).x);
       return column;
     }
@@ -126,30 +120,9 @@ void add_vector_tangent(const ParameterBlock& block, int slot, const PlanarBody&
   row2 += sign * (Z.re * im + Z.im * re);
 }
 
-struct Multipliers1 {
-  double lambda = 0, mu0 = 0, mu1 = 0, mu2 = 0;
-};
-
-// The cotangent of x in  lambda (x'y)_eta + mu0 x'y + mu1 (x'y)dot + mu2 (x'y)ddot.
-PlanarJetBar product_bar(const Jet<Plane>& y, const Plane& y_eta, const Multipliers1& z) {
-  return {z.lambda * y_eta + z.mu0 * y.x + z.mu1 * y.xd + z.mu2 * y.xdd, z.mu1 * y.x + (2 * z.mu2) * y.xd, z.mu2 * y.x,
-          z.lambda * y.x};
-}
-
-// The cotangent of d in the same of |d|, with u = d/|d| and across(x) = (x - u u'x)/l as in distance.cpp.
-PlanarJetBar distance_bar(const Jet<Plane>& d, const Plane& d_eta, const Multipliers1& z) {
-  const double l = std::sqrt(squared_norm(d.x));
-  const Plane u = (1 / l) * d.x;
-  const auto across = [&](const Plane& x) { return (1 / l) * (x - dot(u, x) * u); };
-  const double ldot = dot(u, d.xd), c = (squared_norm(d.xd) - ldot * ldot) / l;
-  return {z.lambda * across(d_eta) + z.mu0 * u + z.mu1 * across(d.xd) +
-              z.mu2 * (across(d.xdd) - (2 * ldot / l) * across(d.xd) - (c / l) * u),
-          z.mu1 * u + (2 * z.mu2) * across(d.xd), z.mu2 * u, z.lambda * u};
-}
-
 // Adds the cotangents in Im w,  w = mu0 log A + mu1 Adot/A + mu2 (Addot/A - (Adot/A)^2) + lambda A_eta/A:  the
 // cotangent of z in Im w is i conj(dw/dz).
-void add_angle_bar(const PlanarFrame<double>& f, const Multipliers1& z, PlanarFrameBar& bar) {
+void add_angle_bar(const PlanarFrame<double>& f, const RowWeights& z, PlanarFrameBar& bar) {
   const Plane over = inverse(f.A), rate = f.Adot * over, second = f.Addot * over;
   const Plane change{0, f.theta_eta};  // A_eta/A
   const auto add = [](Plane& to, const Plane& w_z) { to += times_i(conj(w_z)); };
@@ -159,29 +132,35 @@ void add_angle_bar(const PlanarFrame<double>& f, const Multipliers1& z, PlanarFr
   add(bar.A_eta, z.lambda * over);
 }
 
-Multipliers1 times(double s, const Multipliers1& z) { return {s * z.lambda, s * z.mu0, s * z.mu1, s * z.mu2}; }
+RowWeights times(double s, const RowWeights& z) { return {s * z.lambda, s * z.mu0, s * z.mu1, s * z.mu2}; }
 
 // Add the cotangent of the separation of the primitive's points, or those of a single row, to the frames and vectors.
 void add_separation_bar(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2,
-                        const PlanarJetBar& bar, PlanarFrameBar& bar1, PlanarFrameBar& bar2, Vectors<double>& s_bar) {
+                        const MovedJet<Plane>& bar, PlanarFrameBar& bar1, PlanarFrameBar& bar2,
+                        Vectors<double>& s_bar) {
   add_point_bar(f2, c.s2, bar, 1, bar2, s_bar.s2);
   add_point_bar(f1, c.s1, bar, -1, bar1, s_bar.s1);
 }
 void add_row_bar(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2,
-                 const Multipliers1& z, PlanarFrameBar& bar1, PlanarFrameBar& bar2, Vectors<double>& s_bar) {
+                 const RowWeights& z, PlanarFrameBar& bar1, PlanarFrameBar& bar2, Vectors<double>& s_bar) {
   const auto changed = [](const PlanarFrame<double>& f, const Plane& s) { return f.turned(f.A * s); };
-  const Plane d_eta = f2.r_eta - f1.r_eta + changed(f2, c.s2) - changed(f1, c.s1);
+  const auto moved = [&](const PlanarFrame<double>& f, const Plane& s) {
+    return MovedJet<Plane>{vector_of(f, s), changed(f, s)};
+  };
+  const auto moved_separation = [&] {
+    return MovedJet<Plane>{separation(f1, f2, vectors(c)), f2.r_eta - f1.r_eta + changed(f2, c.s2) - changed(f1, c.s1)};
+  };
   switch (c.kind) {
     case Kind::dot1:
-      add_vector_bar(f1, c.s1, product_bar(vector_of(f2, c.s2), changed(f2, c.s2), z), 1, bar1, s_bar.s1);
-      add_vector_bar(f2, c.s2, product_bar(vector_of(f1, c.s1), changed(f1, c.s1), z), 1, bar2, s_bar.s2);
+      add_vector_bar(f1, c.s1, product_bar(moved(f2, c.s2), z), 1, bar1, s_bar.s1);
+      add_vector_bar(f2, c.s2, product_bar(moved(f1, c.s1), z), 1, bar2, s_bar.s2);
       break;
     case Kind::dot2:
-      add_vector_bar(f1, c.s3, product_bar(separation(f1, f2, vectors(c)), d_eta, z), 1, bar1, s_bar.s3);
-      add_separation_bar(c, f1, f2, product_bar(vector_of(f1, c.s3), changed(f1, c.s3), z), bar1, bar2, s_bar);
+      add_vector_bar(f1, c.s3, product_bar(moved_separation(), z), 1, bar1, s_bar.s3);
+      add_separation_bar(c, f1, f2, product_bar(moved(f1, c.s3), z), bar1, bar2, s_bar);
       break;
     case Kind::distance:
-      add_separation_bar(c, f1, f2, distance_bar(separation(f1, f2, vectors(c)), d_eta, z), bar1, bar2, s_bar);
+      add_separation_bar(c, f1, f2, length_bar(moved_separation(), z), bar1, bar2, s_bar);
       break;
     case Kind::angle:
       add_angle_bar(f2, times(c.sign, z), bar2);
@@ -196,15 +175,15 @@ void add_row_bar(const PlanarConstraint& c, const PlanarFrame<double>& f1, const
 
 // J eta of a single row, for the virtual displacement in the frames.
 double virtual_change(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2) {
-  const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
+  const PlanarColumn<double> J = column_of(c, f1, f2, vectors(c));
   return dot(J.force1, f1.r_eta) + dot(J.force2, f2.r_eta) + J.moment1 * f1.theta_eta + J.moment2 * f2.theta_eta;
 }
 
 }  // namespace
 
-PlanarColumn jacobian_of_row(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2) {
-  const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
-  return {J.force1, J.force2, J.moment1, J.moment2};
+PlanarColumn<double> jacobian_of_row(const PlanarConstraint& c, const PlanarFrame<double>& f1,
+                                     const PlanarFrame<double>& f2) {
+  return column_of(c, f1, f2, vectors(c));
 }
 
 // Phi or a time derivative of it, without laws. branch(c, value) puts an angle on its branch.
@@ -252,12 +231,12 @@ void PlanarConstraints::add_pull_back(const Frames& frames, RowLaws& laws, const
     const PlanarFrame<double>&f1 = frames[i], &f2 = frames[j];
     Vectors<double> s_bar;
     if (c.kind == Kind::point) {
-      const PlanarJetBar bar{point(weights.mu0, c), point(weights.mu1, c), point(weights.mu2, c),
-                             point(weights.lambda, c)};
+      const MovedJet<Plane> bar{{point(weights.mu0, c), point(weights.mu1, c), point(weights.mu2, c)},
+                                point(weights.lambda, c)};
       add_separation_bar(c, f1, f2, bar, bars[i], bars[j], s_bar);
     } else {
-      const Multipliers1 unscaled{of(weights.lambda, c.row), of(weights.mu0, c.row), of(weights.mu1, c.row),
-                                  of(weights.mu2, c.row)};
+      const RowWeights unscaled{of(weights.lambda, c.row), of(weights.mu0, c.row), of(weights.mu1, c.row),
+                                of(weights.mu2, c.row)};
       add_row_bar(c, f1, f2, times(c.factor, unscaled), bars[i], bars[j], s_bar);
       if (c.slot_factor >= 0) {
         const auto phi = [&](Order order) { return phi_of(order, c, f1, f2, vectors(c)); };

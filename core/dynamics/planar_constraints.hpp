@@ -21,11 +21,13 @@
 namespace mbsopt {
 
 // J' of a row: the force and moment of a unit multiplier on each body (factor left out).
+template <class T>
 struct PlanarColumn {
-  Plane force1, force2;
-  double moment1 = 0, moment2 = 0;
+  Complex<T> force1, force2;
+  T moment1 = 0, moment2 = 0;
 };
-PlanarColumn jacobian_of_row(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2);
+PlanarColumn<double> jacobian_of_row(const PlanarConstraint& c, const PlanarFrame<double>& f1,
+                                     const PlanarFrame<double>& f2);
 
 class PlanarConstraints {
  public:

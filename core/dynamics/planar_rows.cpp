@@ -56,7 +56,7 @@ void PlanarRows::evaluate(const Frames& frames) {
   for (Entry& e : entries_) e.J[0] = e.J[1] = e.J[2] = 0;
   for (const Single& s : singles_) {
     const PlanarConstraint& c = model_->constraints[at(s.constraint)];
-    const PlanarColumn column = jacobian_of_row(c, frames[at(c.body1)], frames[at(c.body2)]);
+    const PlanarColumn<double> column = jacobian_of_row(c, frames[at(c.body1)], frames[at(c.body2)]);
     const auto add = [&](int entry, const Plane& force, double moment) {
       if (entry < 0) return;
       double* J = entries_[at(entry)].J;

@@ -27,21 +27,15 @@ bool PlanarSprings::lie_in_plane(const Eigen::VectorXd& y) const {
   return true;
 }
 
-PlanarSprings::Span PlanarSprings::span(const Spring& s, const std::vector<PlanarFrame<double>>& frames) {
+SpringSpan<Plane> PlanarSprings::span(const Spring& s, const std::vector<PlanarFrame<double>>& frames) {
   const PlanarFrame<double>&f1 = frames[s.body1], &f2 = frames[s.body2];
-  Span x;
-  x.d = f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1;
-  x.ddot = f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1;
-  x.l = std::sqrt(squared_norm(x.d));
-  x.u = x.l > 0 ? (1 / x.l) * x.d : Plane{};
-  x.ldot = dot(x.u, x.ddot);
-  return x;
+  return {f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1, f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1};
 }
 
 void PlanarSprings::add_loads(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
                               std::vector<Vec<3>>& loads) const {
   for (const Spring& s : springs_) {
-    const Span x = span(s, frames);
+    const SpringSpan<Plane> x = span(s, frames);
     const Plane F = s.force->law.value(t, data_.rho, x.l, x.ldot, scratch) * x.u;
     const auto add = [&](std::size_t body, const Plane& at, const Plane& force) {
       if (body == 0) return;
@@ -58,28 +52,16 @@ void PlanarSprings::add_pull_back(double t, const std::vector<PlanarFrame<double
                                   std::vector<PlanarFrameBar>& bars, Eigen::VectorXd& theta_bar,
                                   Eigen::VectorXd& rho_bar) const {
   for (const Spring& s : springs_) {
-    const Span x = span(s, frames);
-    const Law& law = s.force->law;
+    const SpringSpan<Plane> x = span(s, frames);
     const auto moved = [&](std::size_t body, const Plane& at) {
       return frames[body].r_eta + frames[body].turned(frames[body].A * at);
     };
     const Plane d_eta = moved(s.body2, s.s2) - moved(s.body1, s.s1);
-    PlanarJetBar bar;
-    if (x.l == 0) {
-      if (!s.force->is_k_times_d()) continue;
-      bar.x = -law.k * d_eta;
-    } else {
-      const Law::Value f = law.derivatives(t, data_.rho, x.l, x.ldot, scratch);
-      const double l_eta = dot(x.u, d_eta);
-      bar.x =
-          (-l_eta) * (f.f_x * x.u + (f.f_xdot / x.l) * (x.ddot - x.ldot * x.u)) - (f.f / x.l) * (d_eta - l_eta * x.u);
-      bar.xd = (-l_eta * f.f_xdot) * x.u;
-      bar.eta = -f.f * x.u;
-      law.add_field_gradient(x.l, x.ldot, -l_eta, scratch, theta_bar, rho_bar);
-    }
+    const std::optional<MovedJet<Plane>> bar = s.force->work_bar(t, data_.rho, x, d_eta, scratch, theta_bar, rho_bar);
+    if (!bar) continue;
     const auto add = [&](std::size_t body, const Plane& at, double sign, int slot) {
       Plane s_bar;
-      add_point_bar(frames[body], at, bar, sign, bars[body], s_bar);
+      add_point_bar(frames[body], at, *bar, sign, bars[body], s_bar);
       if (slot >= 0) theta_bar.segment<3>(slot) += data_.planar->bodies[body].in_body(s_bar);
     };
     add(s.body2, s.s2, 1, s.force->slot2);

@@ -10,6 +10,8 @@
 namespace mbsopt {
 
 struct TsdaForce;  // core/force/tsda.hpp
+template <class V>
+struct SpringSpan;
 
 class PlanarSprings {
  public:
@@ -32,11 +34,7 @@ class PlanarSprings {
     std::size_t body1, body2;
     Plane s1, s2;
   };
-  struct Span {
-    Plane d, ddot, u;
-    double l, ldot;
-  };
-  static Span span(const Spring& spring, const std::vector<PlanarFrame<double>>& frames);
+  static SpringSpan<Plane> span(const Spring& spring, const std::vector<PlanarFrame<double>>& frames);
 
   const MechanismData& data_;
   std::vector<Spring> springs_;

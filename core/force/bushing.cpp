@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/constraint/body_vector.hpp"
 #include "core/linear/dual_numbers.hpp"
 
 namespace mbsopt {
@@ -196,12 +197,9 @@ void Bushing::spread(const Coordinates& x, const CoordinateBars& bars, const Fra
   bar1.A += x.D * bars.d.transpose() + x.Ddot * bars.ddot.transpose() + x.D_eta * bars.d_eta.transpose();
   bar1.Adot += x.D * bars.ddot.transpose();
   bar1.A_eta += x.D * bars.d_eta.transpose();
-  bar2.r += D, bar2.rdot += Ddot;
-  bar2.A += D * s2.transpose(), bar2.Adot += Ddot * s2.transpose(), bar2.A_eta += D_eta * s2.transpose();
-  slots.s2 += f2.A.transpose() * D + f2.Adot.transpose() * Ddot + f2.A_eta.transpose() * D_eta;
-  bar1.r -= D, bar1.rdot -= Ddot;
-  bar1.A -= D * s1.transpose(), bar1.Adot -= Ddot * s1.transpose(), bar1.A_eta -= D_eta * s1.transpose();
-  slots.s1 -= f1.A.transpose() * D + f1.Adot.transpose() * Ddot + f1.A_eta.transpose() * D_eta;
+  const VectorJet D_bar{{D, Ddot, Vector3d::Zero()}, D_eta};
+  add_point_bar(f2, s2, D_bar, 1, bar2, slots.s2);
+  add_point_bar(f1, s1, D_bar, -1, bar1, slots.s1);
 
   // theta = g a, thetadot = g' c_dot a + g a_dot, theta_eta = g' c_eta a + g a_eta
   const Vector3d a_bar = x.g * bars.theta + x.g1 * (x.c_dot * bars.thetadot + x.c_eta * bars.theta_eta);

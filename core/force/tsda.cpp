@@ -2,43 +2,36 @@
 
 #include <algorithm>
 
-#include "core/body/dual_frame.hpp"
+#include "core/constraint/body_vector.hpp"
 
 namespace mbsopt {
 
-TsdaForce::Span TsdaForce::span(const Frame& f1, const Frame& f2) const {
-  Span x;
-  x.d = f2.point(s2) - f1.point(s1);
-  x.ddot = f2.point_dot(s2) - f1.point_dot(s1);
-  x.l = x.d.norm();
-  x.u = x.l > 0 ? Vector3d(x.d / x.l) : Vector3d(Vector3d::Zero());
-  x.ldot = x.u.dot(x.ddot);
-  return x;
+SpringSpan<Vector3d> TsdaForce::span(const Frame& f1, const Frame& f2) const {
+  return {f2.point(s2) - f1.point(s1), f2.point_dot(s2) - f1.point_dot(s1)};
 }
 
 Law::Point TsdaForce::measured(const Eigen::VectorXd&, const Frame& f1, const Frame& f2) const {
-  const Span x = span(f1, f2);
+  const SpringSpan<Vector3d> x = span(f1, f2);
   return {x.l, x.ldot};
 }
 
 void TsdaForce::pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar, FrameBar& bar1,
                                    FrameBar& bar2, FieldGradient& fields) const {
-  const Span x = span(f1, f2);
+  const SpringSpan<Vector3d> x = span(f1, f2);
   // l_d = u,  (ldot)_d = (ddot - ldot u)/l,  (ldot)_ddot = u; a spring of zero length has no direction
   const Vector3d ddot_bar = xdot_bar * x.u;
   Vector3d d_bar = x_bar * x.u;
   if (x.l > 0) d_bar += xdot_bar * (x.ddot - x.ldot * x.u) / x.l;
-  const auto add = [&](const Frame& f, const Vector3d& s, double sign, int slot, FrameBar& bar) {
-    bar.r += sign * d_bar, bar.rdot += sign * ddot_bar;
-    bar.A += sign * d_bar * s.transpose(), bar.Adot += sign * ddot_bar * s.transpose();
-    fields.add<3>(slot, sign * (f.A.transpose() * d_bar + f.Adot.transpose() * ddot_bar));
-  };
-  add(f1, s1, -1, slot1, bar1);
-  add(f2, s2, 1, slot2, bar2);
+  const VectorJet bar{{d_bar, ddot_bar, Vector3d::Zero()}, Vector3d::Zero()};
+  Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
+  add_point_bar(f1, s1, bar, -1, bar1, s1_bar);
+  add_point_bar(f2, s2, bar, 1, bar2, s2_bar);
+  fields.add<3>(slot1, s1_bar);
+  fields.add<3>(slot2, s2_bar);
 }
 
 void TsdaForce::add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const {
-  const Span x = span(f1, f2);
+  const SpringSpan<Vector3d> x = span(f1, f2);
   const Vector3d F = law.value(in.t, in.rho, x.l, x.ldot, in.scratch) * x.u;
   add_force(f1, s1, F, load1);
   add_force(f2, s2, Vector3d(-F), load2);
@@ -46,29 +39,19 @@ void TsdaForce::add_load(const ForceInputs& in, const Frame& f1, const Frame& f2
 
 void TsdaForce::pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
                           Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
-  const Span x = span(f1, f2);
-  if (x.l == 0) {  // work = -k d'd_eta
-    if (!is_k_times_d()) return;
-    const Vector3d d_eta = f2.point_eta(s2) - f1.point_eta(s1), zero = Vector3d::Zero();
-    add_point(f2, s2, 1, slot2, -law.k * d_eta, zero, zero, bar2, theta_bar);
-    add_point(f1, s1, -1, slot1, -law.k * d_eta, zero, zero, bar1, theta_bar);
-    return;
-  }
-  const Law::Value f = law.derivatives(in.t, in.rho, x.l, x.ldot, in.scratch);
+  const SpringSpan<Vector3d> x = span(f1, f2);
   const Vector3d d_eta = f2.point_eta(s2) - f1.point_eta(s1);
-  const double l_eta = x.u.dot(d_eta);
-  // work = -f l_eta;   l_d = u,  (ldot)_d = (ddot - ldot u)/l,  (ldot)_ddot = u,  (l_eta)_d = (d_eta - l_eta u)/l
-  const Vector3d d_bar =
-      -l_eta * (f.f_x * x.u + f.f_xdot * (x.ddot - x.ldot * x.u) / x.l) - f.f * (d_eta - l_eta * x.u) / x.l;
-  const Vector3d ddot_bar = -l_eta * f.f_xdot * x.u;
-  const Vector3d eta_bar = -f.f * x.u;
-  law.add_field_gradient(x.l, x.ldot, -l_eta, in.scratch, theta_bar, rho_bar);
-  add_point(f2, s2, 1, slot2, d_bar, ddot_bar, eta_bar, bar2, theta_bar);
-  add_point(f1, s1, -1, slot1, d_bar, ddot_bar, eta_bar, bar1, theta_bar);
+  const std::optional<VectorJet> bar = work_bar(in.t, in.rho, x, d_eta, in.scratch, theta_bar, rho_bar);
+  if (!bar) return;
+  Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
+  add_point_bar(f2, s2, *bar, 1, bar2, s2_bar);
+  add_point_bar(f1, s1, *bar, -1, bar1, s1_bar);
+  if (slot1 >= 0) theta_bar.segment<3>(slot1) += s1_bar;
+  if (slot2 >= 0) theta_bar.segment<3>(slot2) += s2_bar;
 }
 
 Law::Value TsdaForce::at(const ForceInputs& in, const Frame& f1, const Frame& f2) const {
-  const Span x = span(f1, f2);
+  const SpringSpan<Vector3d> x = span(f1, f2);
   return law.derivatives(in.t, in.rho, x.l, x.ldot, in.scratch);
 }
 
@@ -113,18 +96,6 @@ void TsdaForce::pull_back_potential(const Eigen::VectorXd&, const Frame& f1, con
 double TsdaForce::natural_energy(const Frame& f1, const Frame& f2) const {
   const double l = span(f1, f2).l;
   return law.k * std::max(l * l, law.x0 * law.x0);
-}
-
-void TsdaForce::add_point(const Frame& f, const Vector3d& s, double sign, int slot, const Vector3d& d,
-                          const Vector3d& dd, const Vector3d& eta, FrameBar& bar, Eigen::VectorXd& theta_bar) {
-  bar.r += sign * d;
-  bar.rdot += sign * dd;
-  bar.A += sign * d * s.transpose();
-  bar.Adot += sign * dd * s.transpose();
-  bar.A_eta += sign * eta * s.transpose();
-  if (slot >= 0) {
-    theta_bar.segment<3>(slot) += sign * (f.A.transpose() * d + f.Adot.transpose() * dd + f.A_eta.transpose() * eta);
-  }
 }
 
 }  // namespace mbsopt

@@ -7,11 +7,23 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <optional>
 
 #include "core/body/frame.hpp"
+#include "core/body/jet.hpp"
 #include "core/force/force_inputs.hpp"
 
 namespace mbsopt {
+
+// The separation of the points with its rate, in space or in the plane.
+template <class V>
+struct SpringSpan {
+  V d, ddot, u;
+  double l, ldot;
+  SpringSpan(const V& separation, const V& rate)
+      : d(separation), ddot(rate), u(direction(d, std::sqrt(dot(d, d)))), l(std::sqrt(dot(d, d))), ldot(dot(u, ddot)) {}
+};
 
 struct TsdaForce {
   int force = 0;  // index in the scene
@@ -20,11 +32,7 @@ struct TsdaForce {
   int slot1 = -1, slot2 = -1;
   Law law;
 
-  struct Span {
-    Vector3d d, ddot, u;
-    double l, ldot;
-  };
-  Span span(const Frame& f1, const Frame& f2) const;
+  SpringSpan<Vector3d> span(const Frame& f1, const Frame& f2) const;
   // Without free length, actuator and damping the force is k d, smooth at zero length, too.
   bool is_k_times_d() const { return !law.program && law.x0 == 0 && law.f0 == 0 && law.c == 0; }
 
@@ -33,6 +41,25 @@ struct TsdaForce {
   // Gradient of x_bar l + xdot_bar ldot.
   void pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar, FrameBar& bar1,
                           FrameBar& bar2, FieldGradient& fields) const;
+
+  // The gradient of the virtual work in d, its rate and d_eta (d_eta held fixed); it adds that in the law's fields.
+  // There is none without a direction.
+  template <class V>
+  std::optional<MovedJet<V>> work_bar(double t, const Eigen::VectorXd& rho, const SpringSpan<V>& x, const V& d_eta,
+                                      Law::Scratch& scratch, Eigen::VectorXd& theta_bar,
+                                      Eigen::VectorXd& rho_bar) const {
+    const V none = 0.0 * d_eta;
+    if (x.l == 0 && !is_k_times_d()) return std::nullopt;
+    if (x.l == 0) return MovedJet<V>{{V(-law.k * d_eta), none, none}, none};  // work = -k d'd_eta
+    const Law::Value f = law.derivatives(t, rho, x.l, x.ldot, scratch);
+    const double l_eta = dot(x.u, d_eta);
+    law.add_field_gradient(x.l, x.ldot, -l_eta, scratch, theta_bar, rho_bar);
+    // work = -f l_eta;   l_d = u,  (ldot)_d = (ddot - ldot u)/l,  (ldot)_ddot = u,  (l_eta)_d = (d_eta - l_eta u)/l
+    return MovedJet<V>{
+        {V(-l_eta * (f.f_x * x.u + (f.f_xdot / x.l) * (x.ddot - x.ldot * x.u)) - (f.f / x.l) * (d_eta - l_eta * x.u)),
+         V((-l_eta * f.f_xdot) * x.u), none},
+        V(-f.f * x.u)};
+  }
 
   // Adds the loads (force in global axes, moment in body axes) on each body.
   void add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const;
@@ -57,10 +84,6 @@ struct TsdaForce {
                            FrameBar& bar2, FieldGradient& fields) const;
   bool conserves_energy() const { return law.conserves_energy(); }
   double natural_energy(const Frame& f1, const Frame& f2) const;
-
- private:
-  static void add_point(const Frame& f, const Vector3d& s, double sign, int slot, const Vector3d& d, const Vector3d& dd,
-                        const Vector3d& eta, FrameBar& bar, Eigen::VectorXd& theta_bar);
 };
 
 }  // namespace mbsopt

@@ -197,8 +197,9 @@ class BodyInSpace {
   // G(p')' w for lanes of p'.
   static Lanes<4> G_transposed_direction(const Lanes<4>& p_dir, const Vector3d& w) {
     Lanes<4> out;
-    out.row(0) = -dot(w, p_dir.bottomRows<3>());
-    out.bottomRows<3>() = w * p_dir.row(0) - cross(w, p_dir.bottomRows<3>());
+    const Lanes<3> e_dir = p_dir.bottomRows<3>();
+    out.row(0) = -dot(w, e_dir);
+    out.bottomRows<3>() = w * p_dir.row(0) - cross(w, e_dir);
     return out;
   }
 

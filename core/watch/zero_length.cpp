@@ -49,7 +49,7 @@ std::string through_zero_length(const MechanismData& d, double t0, const Eigen::
     const auto span = [&](const Eigen::VectorXd& y) {
       return f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame);
     };
-    const TsdaForce::Span a = span(y0), b = span(y1);
+    const SpringSpan<Vector3d> a = span(y0), b = span(y1);
     if (a.u.dot(b.u) >= 0) continue;
     const double pull = pull_at_zero(f, t1, d.rho);
     if (pull == 0 || closest(a.d, a.ddot, b.d, b.ddot, t1 - t0) > kThroughZero * std::max(a.l, b.l)) continue;
