@@ -56,6 +56,8 @@ class ProjectorOf final : public Projector {
   bool factor_square();                                 // J at the frames
   void solve_square(const Y& rows, std::vector<X>& x);  // J x = rows
   void response_of_square(Y& out);                      // after settle()
+  void displace(const Y& x);                            // all bodies from the state of read_hat()
+  static void limit_turns(Y& step);
   // Calls f(body, its number without the ground, its frame).
   template <class F>
   void for_bodies(F&& f) {

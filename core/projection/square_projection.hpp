@@ -24,6 +24,21 @@ void ProjectorOf<Body>::solve_square(const Y& rows, std::vector<X>& x) {
   J_factor_.solve(all);
 }
 
+template <class Body>
+void ProjectorOf<Body>::displace(const Y& x) {
+  for_bodies([&](Body& b, std::size_t i, auto& f) { b.displace(x.segment<N>(N * static_cast<Eigen::Index>(i)), f); });
+}
+// Shortens a step in which a body turns too far.
+template <class Body>
+void ProjectorOf<Body>::limit_turns(Y& step) {
+  constexpr double kLongest = 0.5;                 // turn in one step [rad]
+  constexpr Eigen::Index kTurns = N == 3 ? 1 : 3;  // the last unknowns of a body
+  double turn = 0;
+  for (Eigen::Index i = N - kTurns; i < step.size(); i += N)
+    turn = std::max(turn, step.segment<kTurns>(i).cwiseAbs().maxCoeff());
+  if (turn > kLongest) step *= kLongest / turn;
+}
+
 // Uses Newton's method; a turn of each body by dx adds to delta to first order.
 template <class Body>
 bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) {
@@ -91,14 +106,12 @@ void ProjectorOf<Body>::response_of_square(Y& out) {
 template <class Body>
 bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y) {
   constexpr int kMost = 100;
-  constexpr double kLongest = 0.5;    // of a turn in one step [rad]
   constexpr double kShortest = 1e-3;  // part of a step: det J vanishes on the way, or |Phi| has a least value
   if (!square_) return false;
   double sign = 0;
   // |Phi| at the state moved, and J_ there. It is infinite if det J differs in sign from that at the guess.
   const auto violation_at = [&](const Y& moved) {
-    for_bodies(
-        [&](Body& b, std::size_t i, auto& f) { b.displace(moved.segment<N>(N * static_cast<Eigen::Index>(i)), f); });
+    displace(moved);
     constraints_.phi(frames_, laws_, angles, phi_);
     rows_.evaluate(frames_);
     J_ = rows_.dense();
@@ -116,11 +129,7 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
     if (!std::isfinite(violation) || !J_factor_.compute(J_)) return false;
     Y step = -phi_;
     J_factor_.solve(step);
-    double turn = 0;
-    constexpr Eigen::Index kTurns = N == 3 ? 1 : 3;  // the last unknowns of a body
-    for (Eigen::Index i = N - kTurns; i < step.size(); i += N)
-      turn = std::max(turn, step.segment<kTurns>(i).cwiseAbs().maxCoeff());
-    if (turn > kLongest) step *= kLongest / turn;
+    limit_turns(step);
     double part = 1, now = violation_at(step);
     while (!(now < violation)) {
       if ((part /= 2) < kShortest) return false;
@@ -141,10 +150,9 @@ template <class Body>
 double ProjectorOf<Body>::approach(double t, const Y& angles, Y& y, Y& theta_bar, Y& rho_bar) {
   constexpr int kMost = 100;
   constexpr double kStationary = 1e-12;  // relative fall of |Phi| per step
-  constexpr double kLongest = 0.5;       // of a turn in one step [rad]
   const auto read = [&] {
     read_hat(t, y);
-    for_bodies([&](Body& b, std::size_t, auto& f) { b.displace(X::Zero(), f); });
+    displace(Y::Zero(N * data_.n));
     constraints_.phi(frames_, laws_, angles, phi_);
     return phi_.norm();
   };
@@ -158,15 +166,10 @@ double ProjectorOf<Body>::approach(double t, const Y& angles, Y& y, Y& theta_bar
     A.diagonal().array() += damping * violation;
     Y step = cholesky_solve(A, -gradient);
     const double longest = step.cwiseAbs().maxCoeff();
-    double turn = 0;
-    for (Eigen::Index i = N - 1; i < step.size(); i += N) turn = std::max(turn, std::abs(step(i)));
-    if (turn > kLongest) step *= kLongest / turn;
-    for_bodies([&](Body& b, std::size_t i, auto& f) {
-      b.displace(step.segment<N>(N * static_cast<Eigen::Index>(i)), f);
-      b.start_velocity(f);
-    });
+    limit_turns(step);
+    displace(step);
     trial = y;
-    for_bodies([&](Body& b, std::size_t, auto& f) { b.write(f, trial); });
+    for_bodies([&](Body& b, std::size_t, auto& f) { b.start_velocity(f), b.write(f, trial); });
     std::swap(y, trial);
     const double before = violation;
     violation = read();
