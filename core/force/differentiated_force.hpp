@@ -33,26 +33,20 @@ struct DifferentiatedForce : UserForce {
     Q = out;
   }
   void K(double t, VecIn q, VecIn v, VecIn rho, MatOut K) const final {
-    const auto of_q = [&, v = constants(v), rho = constants(rho)](const VectorX<Dual>& x, VectorX<Dual>& out) {
-      own().load(t, x, v, rho, out);
-    };
-    add_jacobian(of_q, q, -1, K);
+    add_partial_jacobian<0>(load_at(t), -1, K, q, v, rho);
   }
   void C(double t, VecIn q, VecIn v, VecIn rho, MatOut C) const final {
-    const auto of_v = [&, q = constants(q), rho = constants(rho)](const VectorX<Dual>& x, VectorX<Dual>& out) {
-      own().load(t, q, x, rho, out);
-    };
-    add_jacobian(of_v, v, -1, C);
+    add_partial_jacobian<1>(load_at(t), -1, C, q, v, rho);
   }
   void Q_rho(double t, VecIn q, VecIn v, VecIn rho, MatOut Q_rho) const final {
-    const auto of_rho = [&, q = constants(q), v = constants(v)](const VectorX<Dual>& x, VectorX<Dual>& out) {
-      own().load(t, q, v, x, out);
-    };
-    add_jacobian(of_rho, rho, 1, Q_rho);
+    add_partial_jacobian<2>(load_at(t), 1, Q_rho, q, v, rho);
   }
 
  private:
   const Force& own() const { return static_cast<const Force&>(*this); }
+  auto load_at(double t) const {
+    return [this, t](const auto& q, const auto& v, const auto& rho, auto& out) { own().load(t, q, v, rho, out); };
+  }
 };
 
 // The mass that a user adds to one body, written once: M, L_q, L_v and L_rho follow from its L.
@@ -89,28 +83,25 @@ struct DifferentiatedInertia : UserForce, InertialLoad {
   }
   void M(VecIn q, VecIn rho, MatOut M) const final {
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(7);  // M is the same at any v and z
-    const auto of_z = [&, q = constants(q), v = constants(none), rho = constants(rho)](
-                          const VectorX<Dual>& x, VectorX<Dual>& out) { own().load(q, v, x, rho, out); };
-    add_jacobian(of_z, none.head(6), -1, M);
+    add_partial_jacobian<2>(load_of_all(), -1, M, q, none, none.head(6), rho);
   }
   void L_q(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_q) const final {
-    const auto of_q = [&, v = constants(v), z = constants(z), rho = constants(rho)](
-                          const VectorX<Dual>& x, VectorX<Dual>& out) { own().load(x, v, z, rho, out); };
-    add_jacobian(of_q, q, 1, L_q);
+    add_partial_jacobian<0>(load_of_all(), 1, L_q, q, v, z, rho);
   }
   void L_v(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_v) const final {
-    const auto of_v = [&, q = constants(q), z = constants(z), rho = constants(rho)](
-                          const VectorX<Dual>& x, VectorX<Dual>& out) { own().load(q, x, z, rho, out); };
-    add_jacobian(of_v, v, 1, L_v);
+    add_partial_jacobian<1>(load_of_all(), 1, L_v, q, v, z, rho);
   }
   void L_rho(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_rho) const final {
-    const auto of_rho = [&, q = constants(q), v = constants(v), z = constants(z)](
-                            const VectorX<Dual>& x, VectorX<Dual>& out) { own().load(q, v, z, x, out); };
-    add_jacobian(of_rho, rho, 1, L_rho);
+    add_partial_jacobian<3>(load_of_all(), 1, L_rho, q, v, z, rho);
   }
 
  private:
   const Load& own() const { return static_cast<const Load&>(*this); }
+  auto load_of_all() const {
+    return [this](const auto& q, const auto& v, const auto& z, const auto& rho, auto& out) {
+      own().load(q, v, z, rho, out);
+    };
+  }
 };
 
 }  // namespace mbsopt

@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
+#include <tuple>
 #include <unsupported/Eigen/AutoDiff>
 
 #include "core/linear/fixed_size.hpp"
@@ -37,6 +39,18 @@ void add_jacobian(Function&& f, const Eigen::Ref<const Eigen::VectorXd>& x, doub
     for (Eigen::Index i = 0; i < J.rows(); ++i) J.row(i).segment(first, count) += scale * lanes(out(i)).head(count);
     for (Eigen::Index k = 0; k < count; ++k) seeded(first + k) = Dual(x(first + k));
   }
+}
+
+// J += scale df/dx of argument number `Of`, the others held fixed. f(x0, x1, .., out) gets a zeroed out.
+template <std::size_t Of, class Function, class... X>
+void add_partial_jacobian(Function&& f, double scale, Eigen::Ref<Eigen::MatrixXd> J, const X&... x) {
+  const std::array<Eigen::Ref<const Eigen::VectorXd>, sizeof...(X)> values{x...};
+  std::array<Eigen::VectorX<Dual>, sizeof...(X)> arguments{constants(x)...};
+  const auto of_one = [&](const Eigen::VectorX<Dual>& seeded, Eigen::VectorX<Dual>& out) {
+    arguments[Of] = seeded;
+    std::apply([&](const auto&... all) { f(all..., out); }, arguments);
+  };
+  add_jacobian(of_one, values[Of], scale, J);
 }
 
 }  // namespace mbsopt

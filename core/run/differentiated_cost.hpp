@@ -18,13 +18,12 @@
 
 namespace mbsopt {
 
-// out += scale d f(x)/dx for a number f(x).
-template <class Function>
-void add_gradient(Function&& f, const Eigen::Ref<const Eigen::VectorXd>& x, double scale,
-                  Eigen::Ref<Eigen::VectorXd> out) {
-  Eigen::MatrixXd row = Eigen::MatrixXd::Zero(1, x.size());
-  const auto as_vector = [&](const Eigen::VectorX<Dual>& at, Eigen::VectorX<Dual>& value) { value(0) = f(at); };
-  add_jacobian(as_vector, x, scale, row);
+// out += scale df/dx of argument number `Of` of a number f(y, rho).
+template <std::size_t Of, class Function>
+void add_gradient(Function&& f, double scale, VecOut out, const VecIn& y, const VecIn& rho) {
+  Eigen::MatrixXd row = Eigen::MatrixXd::Zero(1, out.size());
+  const auto as_vector = [&](const auto& at_y, const auto& at_rho, auto& value) { value(0) = f(at_y, at_rho); };
+  add_partial_jacobian<Of>(as_vector, scale, row, y, rho);
   out += row.transpose();
 }
 
@@ -37,16 +36,17 @@ struct DifferentiatedRunningCost : RunningCost {
     return own().integrand(t, VectorX<double>(y), VectorX<double>(rho));
   }
   void add_g_y(double t, VecIn y, VecIn rho, double scale, VecOut out) const final {
-    const auto of_y = [&, rho = constants(rho)](const VectorX<Dual>& x) -> Dual { return own().integrand(t, x, rho); };
-    add_gradient(of_y, y, scale, out);
+    add_gradient<0>(integrand_at(t), scale, out, y, rho);
   }
   void add_g_rho(double t, VecIn y, VecIn rho, double scale, VecOut out) const final {
-    const auto of_rho = [&, y = constants(y)](const VectorX<Dual>& x) -> Dual { return own().integrand(t, y, x); };
-    add_gradient(of_rho, rho, scale, out);
+    add_gradient<1>(integrand_at(t), scale, out, y, rho);
   }
 
  private:
   const Cost& own() const { return static_cast<const Cost&>(*this); }
+  auto integrand_at(double t) const {
+    return [this, t](const auto& y, const auto& rho) -> Dual { return own().integrand(t, y, rho); };
+  }
 };
 
 template <class Cost>
@@ -56,11 +56,11 @@ struct DifferentiatedTerminalCost : TerminalCost {
 
   double value(VecIn y, VecIn rho) const final { return own().at_end(VectorX<double>(y), VectorX<double>(rho)); }
   void adjoint_init(VecIn y, VecIn rho, VecOut lambda, VecOut mu) const final {
-    lambda.setZero(), mu.setZero();
-    const auto of_y = [&, rho = constants(rho)](const VectorX<Dual>& x) -> Dual { return own().at_end(x, rho); };
-    add_gradient(of_y, y, 1, lambda);
-    const auto of_rho = [&, y = constants(y)](const VectorX<Dual>& x) -> Dual { return own().at_end(y, x); };
-    add_gradient(of_rho, rho, 1, mu);
+    const auto end = [this](const auto& at_y, const auto& at_rho) -> Dual { return own().at_end(at_y, at_rho); };
+    lambda.setZero();
+    add_gradient<0>(end, 1, lambda, y, rho);
+    mu.setZero();
+    add_gradient<1>(end, 1, mu, y, rho);
   }
 
  private:
