@@ -40,7 +40,6 @@ class DrivenMotion final : public MotionSource {
       motion_.z[k] = z.segment<6>(6 * i);
       left[k] -= dynamics_.solver().mass_times(i + 1, motion_.z[k]);
     }
-    dynamics_.terms().add_user_mass(-1, motion_.z, left);
     motion_.lambda += J.solve_transposed(flat(left) - J.transposed_times(motion_.lambda));
     return motion_;
   }

@@ -35,7 +35,7 @@ MotionTerms::MotionTerms(const MechanismData& data, const FormulationSettings& s
 void MotionTerms::set_time(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   t_ = t;
   if (forces_read_y_) y_ = y;
-  if (!user_.inertias().empty()) user_.set_inertias(y);
+  if (!user_.masses().empty()) user_.set_masses(y);
   angles_ = angles;
   laws_.set_time(t);
   if (linear_) linear_->current = false;
@@ -54,11 +54,11 @@ void MotionTerms::set_own_load(std::size_t body) {
   f[body - 1].tail<3>() = -omega.cross(b.J * omega);
 }
 
-void MotionTerms::add_forces(const std::vector<Vec<6>>* accelerations) {
+void MotionTerms::add_forces() {
   if (!has_forces_) return;
   for (Vec<6>& load : body_loads_) load.setZero();
   forces_.add_loads(here(), body_loads_);
-  if (!data_.user_forces.empty()) user_.add_loads(here(), bodies, accelerations, body_loads_);
+  if (!data_.user_forces.empty()) user_.add_loads(here(), bodies, body_loads_);
   for (std::size_t i = 0; i < f.size(); ++i) f[i] += body_loads_[i + 1];
 }
 
@@ -71,7 +71,7 @@ void MotionTerms::set_state(double t, const Eigen::VectorXd& y, const Eigen::Vec
     set_acceleration(none, bodies[k], frames[k]);
     set_own_load(k);
   }
-  add_forces(nullptr);
+  add_forces();
 }
 
 void MotionTerms::set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
@@ -96,7 +96,7 @@ void MotionTerms::set_accelerations() {
 
 void MotionTerms::set_loads() {
   for (std::size_t k = 1; k < bodies.size(); ++k) set_own_load(k);
-  add_forces(&z);
+  add_forces();
 }
 
 void MotionTerms::add_stabilisation(Eigen::VectorXd& gamma) {

@@ -57,15 +57,8 @@ class MotionTerms {
   void add_pull_back(const std::vector<Vec<6>>& eta, const Eigen::VectorXd& mu, const std::vector<Vector4d>& pddot_bar,
                      Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
 
-  // Mass terms of users at the state are not part of the bodies' M. add_user_mass: out += sign M_user x.
-  const std::vector<UserLoads::Inertia>& user_inertias() const { return user_.inertias(); }
-  template <class X>
-  void add_user_mass(double sign, const std::vector<X>& x, std::vector<X>& out) const {
-    for (const UserLoads::Inertia& i : user_.inertias()) {
-      const std::size_t k = static_cast<std::size_t>(i.body) - 1;
-      out[k] += sign * (i.M * x[k]);
-    }
-  }
+  // The mass terms of users at the state, which are part of M.
+  const std::vector<AddedMass<6>>& user_masses() const { return user_.masses(); }
 
   // For statics: laws of time keep their values from now on.
   void hold_laws() { laws_.hold(); }
@@ -76,8 +69,8 @@ class MotionTerms {
  private:
   void set_time(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
   void set_body(const Eigen::VectorXd& y, std::size_t body);
-  void set_own_load(std::size_t body);                        // gravity and turning
-  void add_forces(const std::vector<Vec<6>>* accelerations);  // of mass terms of users; null: 0
+  void set_own_load(std::size_t body);  // gravity and turning
+  void add_forces();
   void add_stabilisation(Eigen::VectorXd& gamma);
   ForceTerms::At here() const { return {t_, y_, angles_, frames}; }
 

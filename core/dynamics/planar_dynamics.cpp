@@ -129,7 +129,7 @@ void PlanarDynamics::set_loads() {
   body_loads_[0].setZero();
   for (const std::size_t k : loaded_) body_loads_[k].setZero();
   forces_.add_loads(here(), body_loads_, springs_in_plane_);
-  user_.add_loads(here(), states_in_space_, nullptr, body_loads_);
+  user_.add_loads(here(), states_in_space_, body_loads_);
   for (const std::size_t k : loaded_) loads_[k - 1] += bodies_in_y_.reduced(k, body_loads_[k]);
 }
 

@@ -33,8 +33,9 @@ constexpr double kDisagreement = 1e-14;
 }  // namespace
 
 template <class Rows>
-BlockSaddleSolver<Rows>::BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c)
-    : rows_(data), S_(rows_.matrix()), alpha_(alpha), c_(c) {
+BlockSaddleSolver<Rows>::BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c,
+                                           const Added& added)
+    : rows_(data), S_(rows_.matrix()), alpha_(alpha), c_(c), added_(added) {
   const std::size_t n = static_cast<std::size_t>(data.n);
   residual_.setZero(rows_.count());
   residual_lanes_.setZero(rows_.count(), kLanes);
@@ -45,6 +46,7 @@ BlockSaddleSolver<Rows>::BlockSaddleSolver(const MechanismData& data, const Eige
 template <class Rows>
 bool BlockSaddleSolver<Rows>::factor(const Frames& frames, Eigen::VectorXd* phi_ddot) {
   rows_.assemble(frames, alpha_, S_, phi_ddot);
+  for (const AddedMass<kUnknowns>& a : added_) S_.diagonal(a.body - 1) += a.M;
   ++factorisations_;
   return S_.factor();
 }
@@ -74,6 +76,9 @@ void BlockSaddleSolver<Rows>::refine(const SaddleIterate& at, bool from_zero, do
   for (int k = 0;; ++k) {
     const bool first = from_zero && k == 0, last = k >= settings.most, decides = last || k + 1 >= settings.least;
     rows_.load(at, first, correction);  // b - M x - J'nu + J' alpha residual
+    for (const AddedMass<kUnknowns>& a : added_) {
+      if (!first) correction[static_cast<std::size_t>(a.body) - 1] -= a.M * x[static_cast<std::size_t>(a.body) - 1];
+    }
     S_.solve(std::span<X>(correction));
     SaddleSizes sizes = rows_.correct(at, first, correction);
     if (c_ > 0) reduce(c_, alpha_, residual);

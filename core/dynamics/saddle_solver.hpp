@@ -36,6 +36,13 @@ struct Refinements {
   double tolerance = 0;
 };
 
+// Mass beside that of the bodies, at the present state: a block of M, symmetric and not negative.
+template <int N>
+struct AddedMass {
+  int body = 0;  // 1-based
+  Mat<N, N> M = Mat<N, N>::Zero();
+};
+
 // Rows gives J and M: in space (ConstraintRows) or in the plane (PlanarRows).
 template <class Rows>
 class BlockSaddleSolver {
@@ -46,8 +53,10 @@ class BlockSaddleSolver {
   using Vector = std::vector<Vec<kUnknowns>>;
   using LaneVector = std::vector<Lanes<kUnknowns>>;
 
-  // alpha is that of S, per row.
-  BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c = 0);
+  using Added = std::vector<AddedMass<kUnknowns>>;
+
+  // alpha is that of S, per row. `added` belongs to M; the caller sets its blocks before factor().
+  BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c = 0, const Added& added = none());
 
   // Factors S with J at the given frames. Returns false if S is not positive definite. phi_ddot receives the frames'
   // Phiddot without laws.
@@ -69,7 +78,11 @@ class BlockSaddleSolver {
   // M x for body i (1-based).
   template <class X>
   X mass_times(int body, const X& x) const {
-    return rows_.mass_times(body, x);
+    X out = rows_.mass_times(body, x);
+    for (const AddedMass<kUnknowns>& a : added_) {
+      if (a.body == body) out += a.M * x;
+    }
+    return out;
   }
 
  private:
@@ -79,6 +92,11 @@ class BlockSaddleSolver {
   template <class X, class Y>
   void refine(const SaddleIterate& at, bool from_zero, double size_of_g, const Settings& settings, std::vector<X>& x,
               Y& nu, Y& residual, std::vector<X>& correction);
+
+  static const Added& none() {
+    static const Added kNone;
+    return kNone;
+  }
 
   Rows rows_;
   BlockCholesky<kUnknowns> S_;
@@ -90,6 +108,7 @@ class BlockSaddleSolver {
   LaneVector correction_lanes_;
   long factorisations_ = 0;
   double residual_ratio_ = 0, residual_size_ = 0;
+  const Added& added_;
 };
 extern template class BlockSaddleSolver<ConstraintRows>;
 extern template class BlockSaddleSolver<PlanarRows>;

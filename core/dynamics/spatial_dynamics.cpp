@@ -11,8 +11,7 @@ SpatialDynamics::SpatialDynamics(const Mechanism& mechanism, const FormulationSe
       data_(mechanism_.data()),
       settings_(saddle_settings(data_, settings)),
       terms_(data_, settings),
-      solver_(data_, settings_.alpha, settings_.compliance),
-      update_(data_, terms_.user_inertias()) {
+      solver_(data_, settings_.alpha, settings_.compliance, terms_.user_masses()) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   loads_bar_.resize(n), eta_.resize(n), z_dir_.resize(n), pddot_bar_.resize(n + 1);
   for (Eigen::VectorXd* x : {&gamma_, &mu_, &g_}) x->setZero(data_.m);
@@ -26,9 +25,7 @@ bool SpatialDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::
   if (!solver_.factor(terms_.frames, &gamma_)) return false;
   terms_.complete_gamma(gamma_);
   g_ = -gamma_;
-  update_.set(terms_.user_inertias(), solver_, settings_.derivatives);
   solver_.solve(terms_.f, g_, settings_.values, terms_.z, terms_.lambda);
-  update_.correct(terms_.user_inertias(), terms_.z, terms_.lambda);
 
   ydot.head(layout.positions()) = y.tail(layout.positions());
   bool finite = true;
@@ -46,9 +43,7 @@ bool SpatialDynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen:
                                 const Eigen::Ref<const Eigen::VectorXd>& a,
                                 const Eigen::Ref<const Eigen::VectorXd>& lambda) {
   terms_.set_motion(t, y, angles, a, lambda);
-  if (!solver_.factor(terms_.frames)) return false;
-  update_.set(terms_.user_inertias(), solver_, settings_.derivatives);
-  return true;
+  return solver_.factor(terms_.frames);
 }
 
 void SpatialDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
@@ -62,7 +57,6 @@ void SpatialDynamics::acceleration_tangent(const ParameterBlock& block, const La
   const StateLayout layout{data_.n};
   terms_.set_tangents(block, y_dir);
   solver_.solve(terms_.b_dir, terms_.c_dir, settings_.derivatives, z_dir_, lambda_dir_);
-  update_.correct(terms_.user_inertias(), z_dir_, lambda_dir_);
   for (std::size_t k = 1; k < terms_.bodies.size(); ++k) {
     const Vector4d& p = terms_.bodies[k].p;
     const Lanes<3> w = z_dir_[k - 1].bottomRows<3>();
@@ -86,7 +80,6 @@ void SpatialDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Ve
   g_.setZero();
   if (motion) g_ = motion->lambda;
   solver_.solve(loads_bar_, g_, settings_.derivatives, eta_, mu_);
-  update_.correct(terms_.user_inertias(), eta_, mu_);
   y_bar.tail(layout.positions()) += w.head(layout.positions());
   terms_.add_pull_back(eta_, mu_, pddot_bar_, y_bar, theta_bar, rho_bar);
 }

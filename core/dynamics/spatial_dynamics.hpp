@@ -16,7 +16,6 @@
 
 #include <vector>
 
-#include "core/dynamics/inertia_update.hpp"
 #include "core/dynamics/motion_terms.hpp"
 #include "core/dynamics/saddle_settings.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -63,7 +62,6 @@ class SpatialDynamics {
   const SaddleSettings settings_;
   MotionTerms terms_;
   SaddleSolver solver_;
-  InertiaUpdate update_;
   std::vector<Vec<6>> loads_bar_, eta_;
   Eigen::VectorXd gamma_, mu_, g_;
   std::vector<Vector4d> pddot_bar_;

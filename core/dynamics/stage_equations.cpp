@@ -35,7 +35,7 @@ void StageEquations::residual(Eigen::Ref<Eigen::VectorXd> r) {
   terms_.set_loads();
   std::vector<Vec<6>>& b = terms_.f;
   for (int i = 1; i <= data_.n; ++i) b[at(i - 1)] -= dynamics_.solver().mass_times(i, terms_.z[at(i - 1)]);
-  rows().subtract_transposed_times(terms_.lambda, b);  // mass terms of users are in the loads
+  rows().subtract_transposed_times(terms_.lambda, b);
   terms_.acceleration_errors(mu_);
   for (std::size_t k = 1; k < terms_.bodies.size(); ++k) {
     const Vector4d &p = terms_.bodies[k].p, &pdot = terms_.bodies[k].pdot;
@@ -62,8 +62,6 @@ void StageEquations::tangent(const ParameterBlock& block, const LaneRows& y_dir,
     r_dir.middleRows<6>(layout.q(i)) = terms_.b_dir[k - 1] - dynamics_.solver().mass_times(i, z_dir_[k - 1]);
     r_dir.row(layout.q(i) + 6) = -dot(a, p_dir) - (2 * pp) * dot(pdot, pdot_dir) - (2 * vv) * p_p_dir;
   }
-  for (const UserLoads::Inertia& i : terms_.user_inertias())
-    r_dir.middleRows<6>(layout.q(i.body)) -= i.M * z_dir_[at(i.body - 1)];
   rows().subtract_times(z_dir_, terms_.c_dir);
   r_dir.bottomRows(data_.m) = terms_.c_dir;
 }
@@ -76,7 +74,6 @@ void StageEquations::add_adjoint(const Eigen::VectorXd& r_bar, Eigen::Ref<Eigen:
     eta_[at(i - 1)] = r_bar.segment<6>(layout.q(i));
     z_bar_[at(i - 1)] = -dynamics_.solver().mass_times(i, eta_[at(i - 1)]);
   }
-  terms_.add_user_mass(-1, eta_, z_bar_);
   rows().subtract_transposed_times(mu_, z_bar_);  // z_bar = -(M eta + J'mu)
   for (std::size_t k = 1; k < terms_.bodies.size(); ++k) {
     const Vector4d &p = terms_.bodies[k].p, &pdot = terms_.bodies[k].pdot;
@@ -91,18 +88,20 @@ void StageEquations::add_adjoint(const Eigen::VectorXd& r_bar, Eigen::Ref<Eigen:
   terms_.add_pull_back(eta_, mu_, no_pddot_bar_, y_bar, theta_bar, rho_bar);
 }
 
+// M of a body, column by column.
+Mat<6, 6> StageEquations::mass(int body) const {
+  Mat<6, 6> M;
+  for (int k = 0; k < 6; ++k) M.col(k) = dynamics_.solver().mass_times(body, Vec<6>(Vec<6>::Unit(k)));
+  return M;
+}
+
 Mat<7, 7> StageEquations::mass_block(int body) const {
-  const BodyData& b = data_.bodies[at(body)];
   const Vector4d& p = terms_.bodies[at(body)].p;
+  const Mat<6, 6> M = mass(body);
   Mat<7, 7> X = Mat<7, 7>::Zero();
-  X.diagonal().head<3>().setConstant(b.mass);
-  X.block<3, 4>(3, 3) = (2 / p.squaredNorm()) * (b.J * G(p));
+  X.topLeftCorner<6, 3>() = M.leftCols<3>();
+  X.block<6, 4>(0, 3) = (2 / p.squaredNorm()) * (M.rightCols<3>() * G(p));
   X.block<1, 4>(6, 3) = p.transpose();
-  for (const UserLoads::Inertia& i : terms_.user_inertias()) {
-    if (i.body != body) continue;
-    X.topLeftCorner<6, 3>() += i.M.leftCols<3>();
-    X.block<6, 4>(0, 3) += (2 / p.squaredNorm()) * (i.M.rightCols<3>() * G(p));
-  }
   return X;
 }
 
@@ -115,10 +114,7 @@ Mat<3, 4> StageEquations::omegadot_by_p(int body) const {
 void StageEquations::add_fixed_a(int body, Mat<7, 7>& q, Mat<7, 7>& v) const {
   const Vector4d &p = terms_.bodies[at(body)].p, &pdot = terms_.bodies[at(body)].pdot;
   const Vector4d a = a_.segment<4>(StateLayout{data_.n}.p(body));
-  q.block<3, 4>(3, 3) += data_.bodies[at(body)].J * omegadot_by_p(body);
-  for (const UserLoads::Inertia& i : terms_.user_inertias()) {
-    if (i.body == body) q.block<6, 4>(0, 3) += i.M.rightCols<3>() * omegadot_by_p(body);
-  }
+  q.block<6, 4>(0, 3) += mass(body).rightCols<3>() * omegadot_by_p(body);
   q.block<1, 4>(6, 3) = (a + 2 * pdot.squaredNorm() * p).transpose();
   v.block<1, 4>(6, 3) = 2 * p.squaredNorm() * pdot.transpose();
 }

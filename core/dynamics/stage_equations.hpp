@@ -49,6 +49,8 @@ class StageEquations {
   long places() const { return places_; }  // how often place_at() was called
 
  private:
+  Mat<6, 6> mass(int body) const;
+
   SpatialDynamics& dynamics_;
   MotionTerms& terms_;
   const MechanismData& data_;

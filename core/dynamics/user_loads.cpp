@@ -20,18 +20,20 @@ UserLoads::UserLoads(const MechanismData& data) : data_(data) {
   for (Eigen::VectorXd* x : {&q_, &v_, &Q_, &e_}) x->setZero(largest);
   K_.setZero(largest, largest), C_.setZero(largest, largest), Q_rho_.setZero(largest, data_.rho.size());
   for (const UserForceData& f : data_.user_forces) {
-    if (f.force->inertia()) inertias_.push_back({&f, f.bodies.front(), Mat<6, 6>::Zero()});
+    if (f.force->inertia()) masses_.push_back({f.bodies.front(), Mat<6, 6>::Zero()});
   }
-  if (inertias_.empty()) return;
-  z_.setZero(6), L_.setZero(6), M_.setZero(6, 6), L_q_.setZero(6, 7), L_rho_.setZero(6, data_.rho.size());
+  if (masses_.empty()) return;
+  z_.setZero(6), L_.setZero(6), M_.setZero(6, 6), L_y_.setZero(6, 14), L_rho_.setZero(6, data_.rho.size());
 }
 
-void UserLoads::set_inertias(const Eigen::VectorXd& y) {
-  for (Inertia& i : inertias_) {
-    set_state(*i.force, y);
+void UserLoads::set_masses(const Eigen::VectorXd& y) {
+  std::size_t k = 0;
+  for (const UserForceData& f : data_.user_forces) {
+    if (!f.force->inertia()) continue;
+    set_state(f, y);
     M_.setZero();
-    i.force->force->inertia()->M(q_.head(7), data_.rho, M_);
-    i.M = M_;
+    f.force->inertia()->M(q_.head(7), data_.rho, M_);
+    masses_[k++].M = M_;
   }
 }
 
@@ -43,18 +45,42 @@ void UserLoads::set_state(const UserForceData& f, const Eigen::VectorXd& y) {
   }
 }
 
-void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, const Accelerations* z,
-                          std::vector<Vec<6>>& loads) {
-  for (const Inertia& i : inertias_) {
-    set_state(*i.force, at.y);
-    L_.setZero(), z_.setZero();
-    if (z) z_ = (*z)[static_cast<std::size_t>(i.body) - 1];
-    i.force->force->inertia()->L(q_.head(7), v_.head(7), z_, data_.rho, L_);
-    loads[static_cast<std::size_t>(i.body)] += L_;
-  }
+// Q, K and C of a force, and L_y = (L_q, L_v) of its mass term.
+void UserLoads::evaluate(const UserForceData& f, const ForceTerms::At& at, const Accelerations& z) {
+  const Eigen::Index size = size_of(f);
+  const auto q = q_.head(size), v = v_.head(size);
+  set_state(f, at.y);
+  Q_.setZero();
+  K_.setZero();
+  C_.setZero();
+  f.force->Q(at.t, q, v, data_.rho, Q_.head(size));
+  f.force->K(at.t, q, v, data_.rho, K_.topLeftCorner(size, size));
+  f.force->C(at.t, q, v, data_.rho, C_.topLeftCorner(size, size));
+  if (!f.force->inertia()) return;
+  z_ = z[static_cast<std::size_t>(f.bodies.front()) - 1];
+  L_y_.setZero();
+  f.force->inertia()->L_q(q, v, z_, data_.rho, L_y_.leftCols(7));
+  f.force->inertia()->L_v(q, v, z_, data_.rho, L_y_.rightCols(7));
+}
+
+// L_rho of its mass term at the state.
+void UserLoads::set_L_rho(const UserForceData& f, const Accelerations& z) {
+  if (!f.force->inertia()) return;
+  z_ = z[static_cast<std::size_t>(f.bodies.front()) - 1];
+  L_rho_.setZero();
+  f.force->inertia()->L_rho(q_.head(7), v_.head(7), z_, data_.rho, L_rho_);
+}
+
+void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, std::vector<Vec<6>>& loads) {
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
     set_state(f, at.y);
+    if (const InertialLoad* inertia = f.force->inertia()) {
+      L_.setZero();
+      z_.setZero();
+      inertia->L(q_.head(7), v_.head(7), z_, data_.rho, L_);
+      loads[static_cast<std::size_t>(f.bodies.front())] += L_;
+    }
     Q_.setZero();
     f.force->Q(at.t, q_.head(size), v_.head(size), data_.rho, Q_.head(size));
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
@@ -67,27 +93,13 @@ void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, const 
 // (T'Q)_y' = T'(-K q' - C v') + (0, 1/2 G(p') Q_p)
 void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z, MotionBlocks& out) {
   constexpr int all = MotionBlocks::r | MotionBlocks::p | MotionBlocks::rdot | MotionBlocks::pdot;
-  for (const Inertia& i : inertias_) {
-    const InertialLoad& load = *i.force->force->inertia();
-    MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(i.body, i.body))];
-    set_state(*i.force, at.y);
-    z_ = z[static_cast<std::size_t>(i.body) - 1];
-    L_q_.setZero();
-    load.L_q(q_.head(7), v_.head(7), z_, data_.rho, L_q_);
-    block.q += L_q_;
-    L_q_.setZero();
-    load.L_v(q_.head(7), v_.head(7), z_, data_.rho, L_q_);
-    block.v += L_q_;
-    block.parts |= all;
-  }
   for (const UserForceData& f : data_.user_forces) {
-    const Eigen::Index size = size_of(f);
-    const auto q = q_.head(size), v = v_.head(size);
-    set_state(f, at.y);
-    Q_.setZero(), K_.setZero(), C_.setZero();
-    f.force->Q(at.t, q, v, data_.rho, Q_.head(size));
-    f.force->K(at.t, q, v, data_.rho, K_.topLeftCorner(size, size));
-    f.force->C(at.t, q, v, data_.rho, C_.topLeftCorner(size, size));
+    evaluate(f, at, z);
+    if (f.force->inertia()) {
+      MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(f.bodies.front(), f.bodies.front()))];
+      block.q += L_y_.leftCols(7);
+      block.v += L_y_.rightCols(7);
+    }
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
       const Eigen::Index row = block_of(k);
       const BodyState& body = bodies[static_cast<std::size_t>(f.bodies[k])];
@@ -109,23 +121,16 @@ void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, const
 void UserLoads::add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
                                   const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs) {
   if (std::all_of(std::begin(block.parameter), std::end(block.parameter), [](int k) { return k < 0; })) return;
-  for (const Inertia& i : inertias_) {
-    set_state(*i.force, at.y);
-    z_ = z[static_cast<std::size_t>(i.body) - 1];
-    L_rho_.setZero();
-    i.force->force->inertia()->L_rho(q_.head(7), v_.head(7), z_, data_.rho, L_rho_);
-    for (int lane = 0; lane < kLanes; ++lane) {
-      if (block.parameter[lane] >= 0)
-        load_dirs[static_cast<std::size_t>(i.body)].col(lane) += L_rho_.col(block.parameter[lane]);
-    }
-  }
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
     set_state(f, at.y);
     Q_rho_.setZero();
     f.force->Q_rho(at.t, q_.head(size), v_.head(size), data_.rho, Q_rho_.topRows(size));
+    set_L_rho(f, z);
     for (int lane = 0; lane < kLanes; ++lane) {
       if (block.parameter[lane] < 0) continue;
+      if (f.force->inertia())
+        load_dirs[static_cast<std::size_t>(f.bodies.front())].col(lane) += L_rho_.col(block.parameter[lane]);
       for (std::size_t k = 0; k < f.bodies.size(); ++k) {
         const std::size_t body = static_cast<std::size_t>(f.bodies[k]);
         load_dirs[body].col(lane) +=
@@ -139,36 +144,17 @@ void UserLoads::add_pull_back(const ForceTerms::At& at, const Bodies& bodies, co
                               const std::vector<Vec<6>>& eta, Eigen::Ref<Eigen::VectorXd> y_bar,
                               Eigen::VectorXd& rho_bar) {
   const StateLayout layout{data_.n};
-  for (const Inertia& i : inertias_) {
-    const InertialLoad& load = *i.force->force->inertia();
-    const Vec<6>& of_body = eta[static_cast<std::size_t>(i.body) - 1];
-    set_state(*i.force, at.y);
-    z_ = z[static_cast<std::size_t>(i.body) - 1];
-    L_q_.setZero();
-    load.L_q(q_.head(7), v_.head(7), z_, data_.rho, L_q_);
-    y_bar.segment<7>(layout.q(i.body)) += L_q_.transpose() * of_body;
-    L_q_.setZero();
-    load.L_v(q_.head(7), v_.head(7), z_, data_.rho, L_q_);
-    y_bar.segment<7>(layout.v(i.body)) += L_q_.transpose() * of_body;
-    L_rho_.setZero();
-    load.L_rho(q_.head(7), v_.head(7), z_, data_.rho, L_rho_);
-    rho_bar += L_rho_.transpose() * of_body;
-  }
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
-    const auto q = q_.head(size), v = v_.head(size);
-    set_state(f, at.y);
+    evaluate(f, at, z);
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
       const Eigen::Index own = block_of(k);
       const std::size_t body = static_cast<std::size_t>(f.bodies[k]);
       e_.segment<3>(own) = eta[body - 1].head<3>();
       e_.segment<4>(own + 3) = 0.5 * G_transposed_times(bodies[body].p, eta[body - 1].tail<3>());
     }
-    Q_.setZero(), K_.setZero(), C_.setZero(), Q_rho_.setZero();
-    f.force->Q(at.t, q, v, data_.rho, Q_.head(size));
-    f.force->K(at.t, q, v, data_.rho, K_.topLeftCorner(size, size));
-    f.force->C(at.t, q, v, data_.rho, C_.topLeftCorner(size, size));
-    f.force->Q_rho(at.t, q, v, data_.rho, Q_rho_.topRows(size));
+    Q_rho_.setZero();
+    f.force->Q_rho(at.t, q_.head(size), v_.head(size), data_.rho, Q_rho_.topRows(size));
     const auto e = e_.head(size);
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
       const Eigen::Index own = block_of(k);
@@ -178,6 +164,13 @@ void UserLoads::add_pull_back(const ForceTerms::At& at, const Bodies& bodies, co
       y_bar.segment<4>(layout.p(f.bodies[k])) += 0.5 * G_transposed_times_adjoint(eta_w, Q_.segment<4>(own + 3));
     }
     rho_bar.noalias() += Q_rho_.topRows(size).transpose().lazyProduct(e);
+    if (!f.force->inertia()) continue;
+    const int own = f.bodies.front();
+    const Vec<6>& of_body = eta[static_cast<std::size_t>(own) - 1];
+    set_L_rho(f, z);
+    y_bar.segment<7>(layout.q(own)).noalias() += L_y_.leftCols(7).transpose().lazyProduct(of_body);
+    y_bar.segment<7>(layout.v(own)).noalias() += L_y_.rightCols(7).transpose().lazyProduct(of_body);
+    rho_bar.noalias() += L_rho_.transpose().lazyProduct(of_body);
   }
 }
 

@@ -1,7 +1,7 @@
 // The forces of users inside the equations of motion. They turn the 7 coordinates of a body's force Q into its 6 loads
 // T'Q, with derivatives. The virtual work is e'Q with e = T(p) eta = (eta_r, 1/2 G(p)' eta_theta).
 //
-// Mass terms of users are loads on the accelerations z themselves: -M z - h.
+// Mass terms of users are loads on the accelerations z themselves: -M z - h. M joins the bodies' mass in the solver.
 //
 // Each thread needs its own UserLoads: it owns the numbers of one evaluation. It allocates nothing after construction.
 #pragma once
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/dynamics/force_terms.hpp"
+#include "core/dynamics/saddle_solver.hpp"
 
 namespace mbsopt {
 
@@ -17,9 +18,9 @@ class UserLoads {
   explicit UserLoads(const MechanismData& data);
 
   using Bodies = std::vector<BodyState>;  // the ground first
-  // Accelerations z per body without the ground, for mass terms. Null means z = 0. The other functions take them at z.
+  // The accelerations z per body without the ground. Derivatives of mass terms are those of -M z - h, loads are -h.
   using Accelerations = std::vector<Vec<6>>;
-  void add_loads(const ForceTerms::At& at, const Bodies& bodies, const Accelerations* z, std::vector<Vec<6>>& loads);
+  void add_loads(const ForceTerms::At& at, const Bodies& bodies, std::vector<Vec<6>>& loads);
   // Derivatives of the loads in the state as blocks, and in the directions of the parameters.
   void add_blocks(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z, MotionBlocks& out);
   void add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
@@ -28,24 +29,21 @@ class UserLoads {
   void add_pull_back(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
                      const std::vector<Vec<6>>& eta, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
 
-  // M of each mass term at the state.
-  struct Inertia {
-    const UserForceData* force = nullptr;
-    int body = 0;  // 1-based
-    Mat<6, 6> M = Mat<6, 6>::Zero();
-  };
-  void set_inertias(const Eigen::VectorXd& y);
-  const std::vector<Inertia>& inertias() const { return inertias_; }
+  // M of each mass term at a state.
+  void set_masses(const Eigen::VectorXd& y);
+  const std::vector<AddedMass<6>>& masses() const { return masses_; }
 
  private:
   void set_state(const UserForceData& force, const Eigen::VectorXd& y);
+  void evaluate(const UserForceData& force, const ForceTerms::At& at, const Accelerations& z);
+  void set_L_rho(const UserForceData& force, const Accelerations& z);
 
   const MechanismData& data_;
   Eigen::VectorXd q_, v_, Q_, e_;
   Eigen::MatrixXd K_, C_, Q_rho_;
-  std::vector<Inertia> inertias_;
+  std::vector<AddedMass<6>> masses_;
   Eigen::VectorXd z_, L_;
-  Eigen::MatrixXd M_, L_q_, L_rho_;
+  Eigen::MatrixXd M_, L_y_, L_rho_;
 };
 
 }  // namespace mbsopt
