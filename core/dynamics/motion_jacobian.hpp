@@ -37,6 +37,14 @@ class MotionJacobian {
   int bodies() const { return n_; }
   int constraints() const { return m_; }
   Values values() const;  // of the right sizes
+  // f(row, column, q, v) for the blocks of -r_q and -r_v: where they begin in the equations of a stage, and in q and v.
+  template <class Function>
+  void for_each_block(const Values& x, Function&& f) const {
+    for (std::size_t k = 0; k < pairs_.size(); ++k)
+      f(columns_of(pairs_[k].row), columns_of(pairs_[k].body), x.q[k], x.v[k]);
+    for (std::size_t k = 0; k < rows_.size(); ++k)
+      f(columns_of(n_) + rows_[k].row, columns_of(rows_[k].body), x.row_q[k], x.row_v[k]);
+  }
 
   // Evaluates them at the current state of the equations.
   void evaluate(StageEquations& equations, Values& out);

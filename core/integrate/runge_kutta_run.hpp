@@ -1,6 +1,6 @@
 // Forward integration by a Runge-Kutta method: adaptive (PI control) or fixed steps, or a frozen sequence of steps.
 // Observers see each accepted step: they sample it, accumulate objectives, keep it for a backward sweep, follow it with
-// tangents, or doubt it.
+// tangents, or object to it.
 //
 //   StepAttempt attempt(mechanism, settings, method);  // serves any number of runs
 //   RungeKuttaRun(attempt, costs, options, result).go(y, angles, observers);

@@ -33,20 +33,12 @@ void ShiftedSystem::solve(Eigen::Ref<Eigen::MatrixXd> x, int refinements) {
   auto r = r_.leftCols(x.cols());
   x_q += gamma_ * x_v;
   r.setZero();
-  std::size_t k = 0;
-  for (const auto& p : jacobian_.pairs()) {
-    auto out = r.middleRows<7>(columns_of(p.row));
-    out.noalias() -= values_.q[k] * x_q.middleRows<7>(columns_of(p.body));
-    out.noalias() -= values_.v[k] * x_v.middleRows<7>(columns_of(p.body));
-    ++k;
-  }
-  k = 0;
-  for (const auto& row : jacobian_.rows()) {
-    auto out = r.row(half_ + row.row);
-    out.noalias() -= values_.row_q[k] * x_q.middleRows<7>(columns_of(row.body));
-    out.noalias() -= values_.row_v[k] * x_v.middleRows<7>(columns_of(row.body));
-    ++k;
-  }
+  jacobian_.for_each_block(values_,
+                           [&]<class Block>(Eigen::Index row, Eigen::Index column, const Block& q, const Block& v) {
+                             auto out = r.middleRows<Block::RowsAtCompileTime>(row);
+                             out.noalias() -= q * x_q.middleRows<7>(column);
+                             out.noalias() -= v * x_v.middleRows<7>(column);
+                           });
   matrix_.solve(r, refinements);
   x_v += gamma_ * r.topRows(half_);
   x_q += gamma_ * gamma_ * r.topRows(half_);
@@ -61,20 +53,12 @@ void ShiftedSystem::solve_transposed(Eigen::Ref<Eigen::MatrixXd> x, int refineme
   r.topRows(half_) = gamma_ * x_v;
   matrix_.solve_transposed(r, refinements);
   y.setZero();
-  std::size_t k = 0;
-  for (const auto& p : jacobian_.pairs()) {
-    const auto beta = r.middleRows<7>(columns_of(p.row));
-    y.middleRows<7>(columns_of(p.body)).noalias() -= values_.q[k].transpose() * beta;
-    y.middleRows<7>(half_ + columns_of(p.body)).noalias() -= values_.v[k].transpose() * beta;
-    ++k;
-  }
-  k = 0;
-  for (const auto& row : jacobian_.rows()) {
-    const auto beta = r.row(half_ + row.row);
-    y.middleRows<7>(columns_of(row.body)).noalias() -= values_.row_q[k].transpose() * beta;
-    y.middleRows<7>(half_ + columns_of(row.body)).noalias() -= values_.row_v[k].transpose() * beta;
-    ++k;
-  }
+  jacobian_.for_each_block(values_,
+                           [&]<class Block>(Eigen::Index row, Eigen::Index column, const Block& q, const Block& v) {
+                             const auto beta = r.middleRows<Block::RowsAtCompileTime>(row);
+                             y.middleRows<7>(column).noalias() -= q.transpose() * beta;
+                             y.middleRows<7>(half_ + column).noalias() -= v.transpose() * beta;
+                           });
   x_q += y.topRows(half_);
   x_v += gamma_ * y.topRows(half_) + y.bottomRows(half_);
 }

@@ -83,14 +83,19 @@ void StageMatrix::make_blocks(const MechanismData& data, const MotionJacobian& j
 // kilometres. Powers of two round nothing.
 void StageMatrix::set_scales(const MechanismData& data) {
   double mass = 0, inertia = 0;
-  for (const BodyData& body : data.bodies)
-    mass = std::max(mass, body.mass), inertia = std::max(inertia, body.J.trace());
+  for (const BodyData& body : data.bodies) {
+    mass = std::max(mass, body.mass);
+    inertia = std::max(inertia, body.J.trace());
+  }
   const auto power_of_two = [](double x) { return std::exp2(std::round(std::log2(x))); };
   const double J = inertia > 0 ? power_of_two(inertia) : 1, L = mass > 0 ? power_of_two(std::sqrt(J / mass)) : 1;
-  column_scale_ << L, L, L, 1, 1, 1, 1;
-  row_scale_ << L, L, L, 1, 1, 1, J;
-  scale_ = row_scale_ * column_scale_.transpose();
-  multiplier_scale_ = (data.row_alpha * J).cwiseSqrt().unaryExpr(power_of_two);
+  const Vec<7> of_rows{{L, L, L, 1, 1, 1, J}}, of_columns{{L, L, L, 1, 1, 1, 1}};  // of a body
+  scale_ = of_rows * of_columns.transpose();
+  const Eigen::VectorXd of_multipliers = (data.row_alpha * J).cwiseSqrt().unaryExpr(power_of_two);
+  row_scale_.resize(per_stage_);
+  column_scale_.resize(per_stage_);
+  row_scale_ << of_rows.replicate(data.n, 1), of_multipliers;
+  column_scale_ << of_columns.replicate(data.n, 1), of_multipliers;
 }
 
 bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values> values,
@@ -157,7 +162,7 @@ void StageMatrix::add_joint(const Joint& joint, int i, const MotionJacobian::Val
     for (std::size_t k = 0; k < places; ++k) {
       G[k] = p * row_v[k] + pp * row_q[k];
       if (i == j) G[k] += J_Z[k];
-      G[k].array() *= column_scale_.transpose().array();
+      G[k].array() *= column_scale_.head<7>().transpose().array();
     }
     for (std::size_t a = 0; a < bodies; ++a) {
       for (std::size_t b = 0; b < bodies; ++b) {
@@ -173,56 +178,49 @@ void StageMatrix::add_joint(const Joint& joint, int i, const MotionJacobian::Val
   }
 }
 
-bool StageMatrix::factor_sparse() {
-  const int n = static_cast<int>(accelerations_), size = static_cast<int>(per_stage_);
-  // f(row, column, value) for all entries of N, scaled, always in the same order.
-  const auto for_each_entry = [&](auto&& f) {
-    const auto block = [&](int row, int column, const MotionJacobian::Block& x) {
-      const MotionJacobian::Block scaled = scale_.cwiseProduct(x);
-      for (int c = 0; c < 7; ++c) {
-        for (int r = 0; r < 7; ++r) f(row + r, column + c, scaled(r, c));
+// f(row, column, value) for all entries of N with epsilon, scaled, always in the same order.
+template <class Function>
+void StageMatrix::for_each_entry(Function&& f) const {
+  for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& of = *values_[at(i)];
+    const auto add = [&](int stage, Eigen::Index row, Eigen::Index column, const auto& block) {
+      for (Eigen::Index c = 0; c < block.cols(); ++c) {
+        for (Eigen::Index r = 0; r < block.rows(); ++r) {
+          f(i * per_stage_ + row + r, stage * per_stage_ + column + c,
+            row_scale_(row + r) * column_scale_(column + c) * block(r, c));
+        }
       }
     };
-    for (int i = 0; i < stages_; ++i) {
-      const MotionJacobian::Values& of = *values_[at(i)];
-      const int stage = i * size;
-      for (int j = 0; j < stages_; ++j) {
-        const double p = P_(i, j), pp = P2_(i, j);
-        for (std::size_t b = 0; b < of.q.size(); ++b) {
-          const auto& place = jacobian_->pairs()[b];
-          block(stage + columns_of(place.row), j * size + columns_of(place.body), p * of.v[b] + pp * of.q[b]);
-        }
-        for (std::size_t r = 0; r < of.row_q.size(); ++r) {
-          const auto& place = jacobian_->rows()[r];
-          const double scale = multiplier_scale_(place.row);
-          for (int e = 0; e < 7; ++e) {
-            f(stage + n + place.row, j * size + columns_of(place.body) + e,
-              scale * column_scale_(e) * (p * of.row_v[r](e) + pp * of.row_q[r](e) + (i == j ? of.J_Z[r](e) : 0.0)));
-          }
-        }
-      }
-      for (int b = 0; b < jacobian_->bodies(); ++b) block(stage + columns_of(b), stage + columns_of(b), of.mass[at(b)]);
-      for (std::size_t r = 0; r < of.J.size(); ++r) {
-        const auto& place = jacobian_->rows()[r];
-        const double scale = multiplier_scale_(place.row);
-        for (int e = 0; e < 6; ++e) {
-          f(stage + columns_of(place.body) + e, stage + n + place.row, scale * row_scale_(e) * of.J[r](e));
-        }
-      }
-      for (int r = 0; r < jacobian_->constraints(); ++r) {
-        f(stage + n + r, stage + n + r, -multiplier_scale_(r) * multiplier_scale_(r) / W_(r));
-      }
+    for (int j = 0; j < stages_; ++j) {
+      const double p = P_(i, j), pp = P2_(i, j);
+      jacobian_->for_each_block(of, [&]<class Block>(int row, int column, const Block& q, const Block& v) {
+        add(j, row, column, Block(p * v + pp * q));
+      });
     }
-  };
+    for (int b = 0; b < jacobian_->bodies(); ++b) add(i, columns_of(b), columns_of(b), of.mass[at(b)]);
+    for (std::size_t k = 0; k < of.J.size(); ++k) {
+      const auto& [row, body] = jacobian_->rows()[k];
+      add(i, accelerations_ + row, columns_of(body), of.J_Z[k]);
+      add(i, columns_of(body), accelerations_ + row, of.J[k].transpose());
+    }
+    for (int r = 0; r < jacobian_->constraints(); ++r) {
+      add(i, accelerations_ + r, accelerations_ + r, Mat<1, 1>(-1 / W_(r)));
+    }
+  }
+}
+
+bool StageMatrix::factor_sparse() {
   if (!sparse_) {
     std::vector<SparseLu::Entry> places;
-    for_each_entry([&](int row, int column, double) { places.push_back({row, column}); });
-    sparse_.emplace(size * stages_, places);
+    for_each_entry([&](Eigen::Index row, Eigen::Index column, double) {
+      places.push_back({static_cast<int>(row), static_cast<int>(column)});
+    });
+    sparse_.emplace(static_cast<int>(size()), places);
   }
   std::vector<double>& x = sparse_->values();
   std::fill(x.begin(), x.end(), 0.0);
   std::size_t k = 0;
-  for_each_entry([&](int, int, double value) { x[sparse_->slot(k++)] += value; });
+  for_each_entry([&](Eigen::Index, Eigen::Index, double value) { x[sparse_->slot(k++)] += value; });
   return sparse_->factor();
 }
 
@@ -326,11 +324,7 @@ void StageMatrix::solve_factored(Eigen::Ref<Eigen::MatrixXd> b) {
 template <bool Columns>
 void StageMatrix::scale(Eigen::Ref<Eigen::MatrixXd> b) const {
   for (int i = 0; i < stages_; ++i) {
-    for (int body = 0; body < jacobian_->bodies(); ++body) {
-      b.middleRows<7>(i * per_stage_ + columns_of(body)).array().colwise() *=
-          (Columns ? column_scale_ : row_scale_).array();
-    }
-    b.middleRows(i * per_stage_ + accelerations_, W_.size()).array().colwise() *= multiplier_scale_.array();
+    b.middleRows(i * per_stage_, per_stage_).array().colwise() *= (Columns ? column_scale_ : row_scale_).array();
   }
 }
 
@@ -346,8 +340,9 @@ void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
   const Eigen::Index stride = blocks_->stride();
   for (int i = 0; i < stages_; ++i) {
     for (int body = 0; body < jacobian_->bodies(); ++body) {
-      by_body_.segment<7>(body * stride + 7 * i) =
-          (Transposed ? column_scale_ : row_scale_).cwiseProduct(b.segment<7>(i * per_stage_ + columns_of(body)));
+      by_body_.segment<7>(body * stride + 7 * i) = (Transposed ? column_scale_ : row_scale_)
+                                                       .head<7>()
+                                                       .cwiseProduct(b.segment<7>(i * per_stage_ + columns_of(body)));
     }
   }
   if (Transposed) {
@@ -358,7 +353,7 @@ void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
   for (int i = 0; i < stages_; ++i) {
     for (int body = 0; body < jacobian_->bodies(); ++body) {
       b.segment<7>(i * per_stage_ + columns_of(body)) =
-          (Transposed ? row_scale_ : column_scale_).cwiseProduct(by_body_.segment<7>(body * stride + 7 * i));
+          (Transposed ? row_scale_ : column_scale_).head<7>().cwiseProduct(by_body_.segment<7>(body * stride + 7 * i));
     }
     auto lambda = b.segment(i * per_stage_ + accelerations_, W_.size());
     lambda.array() /= -W_.array();

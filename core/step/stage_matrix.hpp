@@ -59,6 +59,8 @@ class StageMatrix {
 
   bool factor_blocks();
   void add_joint(const Joint& joint, int i, const MotionJacobian::Values& x);
+  template <class Function>
+  void for_each_entry(Function&& f) const;
   bool factor_sparse();
   bool turn_to_sparse();
   bool is_accurate();
@@ -90,11 +92,10 @@ class StageMatrix {
   const MotionJacobian* jacobian_;
   int stages_;
   Eigen::Index accelerations_, per_stage_;
-  Eigen::VectorXd mobility_;         // per row of Phi: 1/inertia
-  Eigen::VectorXd epsilon_;          // the same
-  Vec<7> row_scale_, column_scale_;  // of a body's equations and accelerations, as they are factored
-  MotionJacobian::Block scale_;      // both, of an entry
-  Eigen::VectorXd multiplier_scale_;
+  Eigen::VectorXd mobility_;                  // per row of Phi: 1/inertia
+  Eigen::VectorXd epsilon_;                   // the same
+  Eigen::VectorXd row_scale_, column_scale_;  // of the equations and unknowns of a stage, as they are factored
+  MotionJacobian::Block scale_;               // both, of an entry of two bodies
   std::vector<Joint> joints_;
   std::vector<BlockLu::Handle> pairs_, diagonal_;  // per pair of the Jacobian; per body
   std::optional<BlockLu> blocks_;                  // none for more stages than it takes
