@@ -15,9 +15,9 @@ namespace {
 constexpr double kSameOptimum = 1e-3;    // of the range of a parameter, in its scale
 constexpr double kSameObjective = 1e-4;  // relative: the accuracy at which searches end
 
-bool is_angle(const Parameter& p) {
+bool may_be_angle(const Parameter& p) {
   const std::optional<Unit> unit = parse_unit(p.unit);
-  return unit && unit->dimension == dimension::kAngle && p.scale == ParameterScale::linear;
+  return p.scale == ParameterScale::linear && (p.unit.empty() || (unit && unit->dimension == dimension::kAngle));
 }
 
 }  // namespace
@@ -41,7 +41,7 @@ bool same_optimum(const Json& a, const Json& b, const Scene& scene) {
     if (parameter->scale == ParameterScale::linear && parameter->value != 0)  // bounds may be wide
       range = std::min(range, kWideRange * std::max({std::abs(there), std::abs(here), std::abs(x(parameter->value))}));
     if (std::abs(there - here) <= kSameOptimum * range) continue;
-    if (!is_angle(*parameter)) return false;
+    if (!may_be_angle(*parameter)) return false;
     const double turn = x(2 * std::numbers::pi) - x(0);
     if (std::abs(std::remainder(there - here, turn)) > kSameOptimum * range) return false;
     are_turned = true;

@@ -24,7 +24,7 @@ inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: 
 bool is_an_optimum(const Json& record);
 
 // Returns whether two optima agree within 1e-3 of the range of each bounded parameter, or of its logarithm if that is
-// the scale. Angles (parameters with the unit rad) may differ by whole turns if the objectives are the same.
+// the scale. Parameters of the unit rad, or of none, may differ by whole turns if the objectives are the same.
 bool same_optimum(const Json& a, const Json& b, const Scene& scene);
 
 struct DistinctOptimum {
