@@ -1,5 +1,10 @@
-// The operations of an expression: value, first and second partial derivatives. The calculus of expressions is written
-// only here. The parser, the folding of constants and every sweep of a Program use this table.
+// The operations of an expression: their values and partial derivatives. The calculus of expressions is written only
+// here. The parser, the folding of constants, every sweep of a Program and its derivative programs use these tables.
+//
+// partials() is a template in its number T, so one table serves three purposes:
+//   double   the derivatives of a sweep
+//   Tangent  the same with their directional derivative, which is what second derivatives are needed for
+//   Term     instructions that compute them (program_builder.hpp): a derivative as a program of its own
 //
 // Derivatives are exact wherever they exist. Elsewhere:
 //   abs at 0                    0 (the middle of its subdifferential)
@@ -49,15 +54,11 @@ int operands(Operation operation);
 
 inline double apply(Operation operation, double a, double b);
 
-// Partial derivatives of f(a, b), with value = apply(operation, a, b).
-struct FirstPartials {
-  double a = 0, b = 0;
+// Partial derivatives of f(a, b).
+template <class T>
+struct Partials {
+  T a, b;
 };
-struct SecondPartials {
-  double aa = 0, ab = 0, bb = 0;
-};
-inline FirstPartials first_partials(Operation operation, double a, double b, double value);
-inline SecondPartials second_partials(Operation operation, double a, double b, double value);
 
 // Functions in the form that users call.
 //   smooth_abs(x, eps)    = sqrt(x^2 + eps^2)                          eps: 1e-6 unless given
@@ -159,151 +160,127 @@ inline double apply(Operation operation, double a, double b) {
   return 0;
 }
 
+// The functions of a number T that partials() needs; T::of(operation, a, b) evaluates an operation.
+template <class T>
+struct Arithmetic {
+  friend T operator+(const T& a, const T& b) { return T::of(Operation::add, a, b); }
+  friend T operator-(const T& a, const T& b) { return T::of(Operation::subtract, a, b); }
+  friend T operator*(const T& a, const T& b) { return T::of(Operation::multiply, a, b); }
+  friend T operator/(const T& a, const T& b) { return T::of(Operation::divide, a, b); }
+  friend T operator-(const T& a) { return T::of(Operation::negate, a, a); }
+  friend T pow(const T& a, const T& b) { return T::of(Operation::power, a, b); }
+  friend T hypot(const T& a, const T& b) { return T::of(Operation::smooth_abs, a, b); }
+  friend T not_above(const T& a, const T& b) { return T::of(Operation::not_above, a, b); }
+  friend T sin(const T& a) { return T::of(Operation::sin, a, a); }
+  friend T cos(const T& a) { return T::of(Operation::cos, a, a); }
+  friend T sinh(const T& a) { return T::of(Operation::sinh, a, a); }
+  friend T cosh(const T& a) { return T::of(Operation::cosh, a, a); }
+  friend T log(const T& a) { return T::of(Operation::log, a, a); }
+  friend T sqrt(const T& a) { return T::of(Operation::sqrt, a, a); }
+  friend T sign(const T& a) { return T::of(Operation::sign, a, a); }
+};
+
 namespace calculus {
 
-// a^b. Zero factors win over infinite ones: b a^(b-1) is 0 for b = 0 whatever a, and a^b log a is 0 at a = 0 < b.
-inline double power_a(double a, double b) { return b == 0 ? 0 : b * std::pow(a, b - 1); }
-inline double power_aa(double a, double b) { return b == 0 || b == 1 ? 0 : b * (b - 1) * std::pow(a, b - 2); }
-inline double power_b(double a, double b, double value) { return a == 0 && b > 0 ? 0 : value * std::log(a); }
-inline double power_bb(double a, double b, double value) {
-  return a == 0 && b > 0 ? 0 : value * std::log(a) * std::log(a);
-}
-inline double power_ab(double a, double b) {  // a^(b-1) (1 + b log a)
-  return a == 0 && b > 1 ? 0 : std::pow(a, b - 1) * (1 + b * std::log(a));
-}
-inline double cosine_of_asin(double a) { return std::sqrt((1 - a) * (1 + a)); }
+inline double sign(double a) { return apply(Operation::sign, a, 0); }
+inline double not_above(double a, double b) { return apply(Operation::not_above, a, b); }
+inline double constant(double x, double) { return x; }  // x as a number of the type of the second argument
+inline double product(double a, double b) { return a == 0 || b == 0 ? 0 : a * b; }  // zero wins over an infinite factor
+inline double quotient(double a, double b) { return b == 0 ? 0 : a / b; }           // 0 where the denominator is
 
 }  // namespace calculus
 
-inline FirstPartials first_partials(Operation operation, double a, double b, double value) {
+// value = apply(operation, a, b). A power a^b has b a^(b-1) = 0 for b = 0 whatever a, and a^b log a = 0 at a = 0 < b.
+template <class T>
+Partials<T> partials(Operation operation, const T& a, const T& b, const T& value) {
+  using calculus::constant, calculus::not_above, calculus::product, calculus::quotient, calculus::sign;
+  using std::cos, std::cosh, std::hypot, std::log, std::pow, std::sin, std::sinh, std::sqrt;
+  const T zero = constant(0, a), one = constant(1, a);
   switch (operation) {
     case Operation::number:
     case Operation::name:
     case Operation::curve:
       break;
+    case Operation::sign:
+    case Operation::not_above:
+      return {zero, zero};
     case Operation::negate:
-      return {-1, 0};
+      return {-one, zero};
     case Operation::add:
-      return {1, 1};
+      return {one, one};
     case Operation::subtract:
-      return {1, -1};
+      return {one, -one};
     case Operation::multiply:
       return {b, a};
     case Operation::divide:
-      return {1 / b, -value / b};
+      return {one / b, -(value / b)};
     case Operation::power:
-      return {calculus::power_a(a, b), calculus::power_b(a, b, value)};
+      return {product(b, pow(a, b - one)), product(value, log(a))};
     case Operation::sin:
-      return {std::cos(a), 0};
+      return {cos(a), zero};
     case Operation::cos:
-      return {-std::sin(a), 0};
+      return {-sin(a), zero};
     case Operation::tan:
-      return {1 + value * value, 0};
+      return {one + value * value, zero};
     case Operation::asin:
-      return {1 / calculus::cosine_of_asin(a), 0};
+      return {one / sqrt((one - a) * (one + a)), zero};
     case Operation::acos:
-      return {-1 / calculus::cosine_of_asin(a), 0};
+      return {-(one / sqrt((one - a) * (one + a))), zero};
     case Operation::atan:
-      return {1 / (1 + a * a), 0};
+      return {one / (one + a * a), zero};
     case Operation::atan2: {
-      const double r = std::hypot(a, b);
-      return {b / r / r, -a / r / r};
+      const T r = hypot(a, b);
+      return {b / r / r, -(a / r / r)};
     }
     case Operation::sinh:
-      return {std::cosh(a), 0};
+      return {cosh(a), zero};
     case Operation::cosh:
-      return {std::sinh(a), 0};
+      return {sinh(a), zero};
     case Operation::tanh: {
-      const double c = std::cosh(a);
-      return {1 / c / c, 0};
+      const T c = cosh(a);
+      return {one / c / c, zero};
     }
     case Operation::exp:
-      return {value, 0};
+      return {value, zero};
     case Operation::log:
-      return {1 / a, 0};
+      return {one / a, zero};
     case Operation::sqrt:
-      return {0.5 / value, 0};
+      return {constant(0.5, a) / value, zero};
     case Operation::abs:
-      return {a > 0 ? 1.0 : (a < 0 ? -1.0 : 0.0), 0};
-    case Operation::min:
-      return a <= b ? FirstPartials{1, 0} : FirstPartials{0, 1};
-    case Operation::max:
-      return a >= b ? FirstPartials{1, 0} : FirstPartials{0, 1};
+      return {sign(a), zero};
+    case Operation::min: {
+      const T first = not_above(a, b);
+      return {first, one - first};
+    }
+    case Operation::max: {
+      const T first = not_above(b, a);
+      return {first, one - first};
+    }
     case Operation::smooth_abs:
-      return value == 0 ? FirstPartials{0, 0} : FirstPartials{a / value, b / value};
-    case Operation::sign:
-    case Operation::not_above:
-      return {};
+      return {quotient(a, value), quotient(b, value)};
   }
   assert(false && "a leaf or a curve");
-  return {};
+  return {zero, zero};
 }
 
-inline SecondPartials second_partials(Operation operation, double a, double b, double value) {
-  switch (operation) {
-    case Operation::number:
-    case Operation::name:
-    case Operation::curve:
-      break;
-    case Operation::negate:
-    case Operation::add:
-    case Operation::subtract:
-    case Operation::abs:
-    case Operation::min:
-    case Operation::max:
-    case Operation::sign:
-    case Operation::not_above:
-      return {};
-    case Operation::multiply:
-      return {0, 1, 0};
-    case Operation::divide:
-      return {0, -1 / b / b, 2 * value / b / b};
-    case Operation::power:
-      return {calculus::power_aa(a, b), calculus::power_ab(a, b), calculus::power_bb(a, b, value)};
-    case Operation::sin:
-      return {-value, 0, 0};
-    case Operation::cos:
-      return {-value, 0, 0};
-    case Operation::tan:
-      return {2 * value * (1 + value * value), 0, 0};
-    case Operation::asin: {
-      const double c = calculus::cosine_of_asin(a);
-      return {a / c / c / c, 0, 0};
-    }
-    case Operation::acos: {
-      const double c = calculus::cosine_of_asin(a);
-      return {-a / c / c / c, 0, 0};
-    }
-    case Operation::atan: {
-      const double d = 1 + a * a;
-      return {-2 * a / d / d, 0, 0};
-    }
-    case Operation::atan2: {
-      const double r = std::hypot(a, b), s = a / r, c = b / r;
-      return {-2 * s * c / r / r, (s - c) * (s + c) / r / r, 2 * s * c / r / r};
-    }
-    case Operation::sinh:
-      return {value, 0, 0};
-    case Operation::cosh:
-      return {value, 0, 0};
-    case Operation::tanh: {
-      const double c = std::cosh(a);
-      return {-2 * value / c / c, 0, 0};
-    }
-    case Operation::exp:
-      return {value, 0, 0};
-    case Operation::log:
-      return {-1 / a / a, 0, 0};
-    case Operation::sqrt:
-      return {-0.25 / value / a, 0, 0};
-    case Operation::smooth_abs: {
-      if (value == 0) return {};
-      const double c = a / value, s = b / value;
-      return {s * s / value, -s * c / value, c * c / value};
-    }
+// A number with its derivative in one direction. Zero directions stay zero for every factor, also an infinite one:
+// values that do not reach the result do not disturb its derivative.
+struct Tangent : Arithmetic<Tangent> {
+  double x = 0, dx = 0;
+
+  Tangent() = default;
+  Tangent(double value, double direction) : x(value), dx(direction) {}
+  static Tangent of(Operation operation, const Tangent& a, const Tangent& b) {
+    const double value = apply(operation, a.x, b.x);
+    const Partials<double> f = partials(operation, a.x, b.x, value);
+    return {value, calculus::product(a.dx, f.a) + calculus::product(b.dx, f.b)};
   }
-  assert(false && "a leaf or a curve");
-  return {};
-}
+  friend Tangent constant(double x, const Tangent&) { return {x, 0}; }
+  friend Tangent product(const Tangent& a, const Tangent& b) {
+    using calculus::product;
+    return {product(a.x, b.x), product(a.dx, b.x) + product(a.x, b.dx)};
+  }
+  friend Tangent quotient(const Tangent& a, const Tangent& b) { return b.x == 0 ? Tangent() : a / b; }
+};
 
 }  // namespace mbsopt

@@ -58,16 +58,16 @@ double Program::value_of(const Instruction& in, double a, double b) const {
   return curve->at(a, order);
 }
 
-FirstPartials Program::first_partials_of(const Instruction& in, double a, double b, double value) const {
-  if (in.operation != Operation::curve) return first_partials(in.operation, a, b, value);
+Partials<double> Program::partials_of(const Instruction& in, double a, double b, double value) const {
+  if (in.operation != Operation::curve) return partials(in.operation, a, b, value);
   const auto& [curve, order] = curve_of(in);
   return {curve->at(a, order + 1), 0};
 }
 
-SecondPartials Program::second_partials_of(const Instruction& in, double a, double b, double value) const {
-  if (in.operation != Operation::curve) return second_partials(in.operation, a, b, value);
+Partials<Tangent> Program::partials_of(const Instruction& in, Tangent a, Tangent b, Tangent value) const {
+  if (in.operation != Operation::curve) return partials(in.operation, a, b, value);
   const auto& [curve, order] = curve_of(in);
-  return {curve->at(a, order + 2), 0, 0};
+  return {Tangent(curve->at(a.x, order + 1), calculus::product(a.dx, curve->at(a.x, order + 2))), Tangent()};
 }
 
 void Program::sweep_values(std::span<const double> x, double* value) const {
@@ -90,12 +90,6 @@ double Program::value(std::span<const double> x, Scratch& scratch) const {
   return scratch.value[code_.size() - 1];
 }
 
-namespace {
-// A zero seed stays zero for every factor, also an infinite one: values that do not reach the result do not disturb its
-// derivative.
-double seeded(double seed, double factor) { return seed == 0 ? 0 : seed * factor; }
-}  // namespace
-
 double Program::add_gradient(std::span<const double> x, double scale, std::span<double> gradient,
                              Scratch& scratch) const {
   if (code_.empty()) return 0;
@@ -114,7 +108,7 @@ double Program::add_gradient(std::span<const double> x, double scale, std::span<
       gradient[static_cast<std::size_t>(in.a)] += seed;
       continue;
     }
-    const FirstPartials d = first_partials_of(in, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
+    const Partials<double> d = partials_of(in, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
     adjoint[in.a] += seed * d.a;
     if (in.b >= 0) adjoint[in.b] += seed * d.b;
   }
@@ -123,13 +117,15 @@ double Program::add_gradient(std::span<const double> x, double scale, std::span<
 
 //   tangent:          v' = f_a a' + f_b b'
 //   adjoint:          a_bar += v_bar f_a
-//   adjoint tangent:  a_bar' += v_bar' f_a + v_bar (f_aa a' + f_ab b')        (and the same for b)
+//   adjoint tangent:  a_bar' += v_bar' f_a + v_bar f_a'                       (and the same for b)
+// f_a' is the derivative of f_a along a' and b': partials() of numbers that carry it.
 double Program::add_gradient_tangent(std::span<const double> x, std::span<const double> x_tangent, double scale,
                                      std::span<double> gradient, std::span<double> gradient_tangent,
                                      Scratch& scratch) const {
   if (code_.empty()) return 0;
   assert(scratch.value.size() >= code_.size() && gradient.size() == x.size());
   assert(x_tangent.size() == x.size() && gradient_tangent.size() == x.size());
+  using calculus::product;
   const std::size_t size = code_.size();
   double* const value = scratch.value.data();
   double* const adjoint = scratch.adjoint.data();
@@ -143,8 +139,8 @@ double Program::add_gradient_tangent(std::span<const double> x, std::span<const 
     } else if (in.operation == Operation::name) {
       tangent[i] = x_tangent[static_cast<std::size_t>(in.a)];
     } else {
-      const FirstPartials d = first_partials_of(in, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
-      tangent[i] = seeded(tangent[in.a], d.a) + (in.b < 0 ? 0 : seeded(tangent[in.b], d.b));
+      const Partials<double> d = partials_of(in, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
+      tangent[i] = product(tangent[in.a], d.a) + (in.b < 0 ? 0 : product(tangent[in.b], d.b));
     }
   }
   std::fill(adjoint, adjoint + size, 0.0);
@@ -159,17 +155,13 @@ double Program::add_gradient_tangent(std::span<const double> x, std::span<const 
       gradient_tangent[static_cast<std::size_t>(in.a)] += seed_tangent;
       continue;
     }
-    const double a = value[in.a], b = in.b < 0 ? 0 : value[in.b];
-    const double a_tangent = tangent[in.a], b_tangent = in.b < 0 ? 0 : tangent[in.b];
-    const FirstPartials d = first_partials_of(in, a, b, value[i]);
-    const SecondPartials dd = second_partials_of(in, a, b, value[i]);
-    adjoint[in.a] += seeded(seed, d.a);
-    adjoint_tangent[in.a] +=
-        seeded(seed_tangent, d.a) + seeded(seed, seeded(a_tangent, dd.aa) + seeded(b_tangent, dd.ab));
+    const auto operand = [&](int k) { return k < 0 ? Tangent() : Tangent(value[k], tangent[k]); };
+    const Partials<Tangent> d = partials_of(in, operand(in.a), operand(in.b), Tangent(value[i], tangent[i]));
+    adjoint[in.a] += product(seed, d.a.x);
+    adjoint_tangent[in.a] += product(seed_tangent, d.a.x) + product(seed, d.a.dx);
     if (in.b < 0) continue;
-    adjoint[in.b] += seeded(seed, d.b);
-    adjoint_tangent[in.b] +=
-        seeded(seed_tangent, d.b) + seeded(seed, seeded(a_tangent, dd.ab) + seeded(b_tangent, dd.bb));
+    adjoint[in.b] += product(seed, d.b.x);
+    adjoint_tangent[in.b] += product(seed_tangent, d.b.x) + product(seed, d.b.dx);
   }
   return tangent[size - 1];
 }

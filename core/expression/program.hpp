@@ -55,6 +55,18 @@ class UnknownName : public std::runtime_error {
 
 class Program {
  public:
+  struct Instruction {
+    Operation operation = Operation::number;
+    int a = -1, b = -1;   // operands: earlier instructions; of a name: the index of the input
+    double constant = 0;  // of a number; of a curve: its place among the curves
+  };
+  // A derivative of a function through samples.
+  struct CurveUse {
+    std::shared_ptr<const Curve> curve;
+    int order = 0;
+    bool operator==(const CurveUse&) const = default;
+  };
+
   // A scratch is sized once and serves every evaluation of one thread. It fits any program that is not larger than its
   // maker.
   struct Scratch {
@@ -82,23 +94,16 @@ class Program {
   const std::vector<int>& used_inputs() const { return used_inputs_; }  // sorted; structurally present
   bool uses(int input) const;
 
- private:
-  struct Instruction {
-    Operation operation = Operation::number;
-    int a = -1, b = -1;   // operands: earlier instructions; of a name: the index of the input
-    double constant = 0;  // of a number; of a curve: its place in curves_
-  };
-  // A derivative of a function through samples.
-  struct CurveUse {
-    std::shared_ptr<const Curve> curve;
-    int order = 0;
-    bool operator==(const CurveUse&) const = default;
-  };
-  friend class ProgramBuilder;
+  // The instructions in the order of evaluation; the last one gives the value. `value` of a scratch has one number
+  // each.
+  const std::vector<Instruction>& code() const { return code_; }
   const CurveUse& curve_of(const Instruction& in) const { return curves_[static_cast<std::size_t>(in.constant)]; }
+
+ private:
+  friend class ProgramBuilder;
   double value_of(const Instruction& in, double a, double b) const;
-  FirstPartials first_partials_of(const Instruction& in, double a, double b, double value) const;
-  SecondPartials second_partials_of(const Instruction& in, double a, double b, double value) const;
+  Partials<double> partials_of(const Instruction& in, double a, double b, double value) const;
+  Partials<Tangent> partials_of(const Instruction& in, Tangent a, Tangent b, Tangent value) const;
   void sweep_values(std::span<const double> x, double* value) const;
   std::vector<Instruction> code_;
   std::vector<int> used_inputs_;

@@ -1,4 +1,4 @@
-// Compiles expressions and derivatives of programs into instructions, for program.cpp and program_derivative.cpp.
+// Compiles expressions, and derivatives and parts of programs, into instructions.
 #pragma once
 
 #include <algorithm>
@@ -12,9 +12,6 @@
 #include "core/expression/syntax_tree.hpp"
 
 namespace mbsopt {
-
-struct Range;            // program_range.hpp
-struct SampledFunction;  // sampled_functions.hpp
 
 // Turns a tree and its definitions into instructions. Equal sub-expressions become one (value numbering), and constants
 // are folded. Factors without effect (x^0, 0 x) disappear, so that used_inputs() is structural.
@@ -30,14 +27,9 @@ class ProgramBuilder {
   // The derivative of another program in one of its inputs, by the chain rule applied to each instruction.
   void build_derivative(const Program& of, int input);
 
-  static std::vector<Program> switches_of(const Program& program);                              // program_switches.hpp
-  static std::vector<SampledFunction> sampled_functions_of(const Program& program);             // sampled_functions.hpp
-  static std::vector<Program> time_parts_of(const Program& program, int parameters, int time);  // time_parts.hpp
-  static std::vector<int> terms_of(const Program& part, const std::vector<double>& rates);      // time_parts.cpp
-  static void ranges_of(const Program& program, std::span<const Range> x, std::vector<Range>& range);
-  // Builds the first of two instructions of another program (how: name), its cosine (cos), its reciprocal (divide),
-  // their difference (subtract) or the distance of the first from a number (number).
-  void build_switch(const Program& of, Operation how, int a, int b, double from = 0);
+  // The value of an instruction of another program, or what `how` makes of it and of a second one: its cosine (cos),
+  // its reciprocal (divide), their difference (subtract), or its distance from a number (number).
+  void build_part(const Program& of, int a, Operation how = Operation::name, int b = -1, double from = 0);
 
  private:
   using Instruction = Program::Instruction;
@@ -134,7 +126,21 @@ class ProgramBuilder {
   }
 
   int number(double value) { return add({Operation::number, -1, -1, value}); }
-  int partial(const Program& of, const Instruction& in, int a, int b, int value, bool first);
+
+  // An instruction of this builder as a number of partials().
+  struct Term : Arithmetic<Term> {
+    ProgramBuilder* builder;
+    int at;
+
+    Term(ProgramBuilder* of, int instruction) : builder(of), at(instruction) {}
+    static Term of(Operation operation, const Term& a, const Term& b) {
+      return {a.builder, a.builder->operation(operation, a.at, operands(operation) == 2 ? b.at : -1)};
+    }
+    Term beside(double x) const { return {builder, builder->number(x)}; }
+    friend Term constant(double x, const Term& like) { return like.beside(x); }
+    friend Term product(const Term& a, const Term& b) { return a * b; }
+    friend Term quotient(const Term& a, const Term& b) { return a / b; }
+  };
 
   // Its number; that of an equal instruction if there is one. A table of numbers with open addressing, at most half
   // full.

@@ -5,8 +5,6 @@
 #include <limits>
 #include <numbers>
 
-#include "core/expression/program_builder.hpp"
-
 namespace mbsopt {
 namespace {
 
@@ -64,7 +62,9 @@ Range range_of(Operation operation, const Range& a, const Range& b, bool same) {
 }
 
 // Splines between samples may pass beyond them.
-Range range_of(const Curve& curve, int order, const Range& a) {
+Range range_of(const Program::CurveUse& use, const Range& a) {
+  const auto& [f, order] = use;
+  const Curve& curve = *f;
   Range r{kInfinity, -kInfinity};
   widen(r, curve.at(a.low, order)), widen(r, curve.at(a.high, order));
   if (curve.is_routine()) return r;
@@ -76,16 +76,16 @@ Range range_of(const Curve& curve, int order, const Range& a) {
 
 }  // namespace
 
-void ProgramBuilder::ranges_of(const Program& program, std::span<const Range> x, std::vector<Range>& range) {
-  range.resize(program.code_.size());
+void ranges_of(const Program& program, std::span<const Range> x, std::vector<Range>& range) {
+  range.resize(program.code().size());
   for (std::size_t i = 0; i < range.size(); ++i) {
-    const Instruction& in = program.code_[i];
+    const Program::Instruction& in = program.code()[i];
     if (in.operation == Operation::number) {
       range[i] = {in.constant, in.constant};
     } else if (in.operation == Operation::name) {
       range[i] = x[static_cast<std::size_t>(in.a)];
     } else if (const Range& a = range[static_cast<std::size_t>(in.a)]; in.operation == Operation::curve) {
-      range[i] = range_of(*program.curve_of(in).curve, program.curve_of(in).order, a);
+      range[i] = range_of(program.curve_of(in), a);
     } else {
       const Range& b = in.b < 0 ? Range{} : range[static_cast<std::size_t>(in.b)];
       range[i] = range_of(in.operation, a, b, in.a == in.b);
@@ -93,10 +93,6 @@ void ProgramBuilder::ranges_of(const Program& program, std::span<const Range> x,
                        a.high > 0 && std::max(-a.low, a.high) > std::abs(b.high);
     }
   }
-}
-
-void ranges_of(const Program& program, std::span<const Range> x, std::vector<Range>& range) {
-  ProgramBuilder::ranges_of(program, x, range);
 }
 
 }  // namespace mbsopt

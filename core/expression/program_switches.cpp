@@ -2,44 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <tuple>
 
 #include "core/expression/program_builder.hpp"
 
 namespace mbsopt {
-
-// how selects cos of a, 1/a (divide), a - b (subtract), a - from (number), or a itself (name).
-void ProgramBuilder::build_switch(const Program& of, Operation how, int a, int b, double from) {
-  const std::size_t size = static_cast<std::size_t>(std::max(a, b)) + 1;
-  std::vector<char> needed(size, 0);
-  needed[static_cast<std::size_t>(a)] = 1;
-  if (b >= 0) needed[static_cast<std::size_t>(b)] = 1;
-  for (std::size_t i = size; i-- > 0;) {
-    const Instruction& in = of.code_[i];
-    if (!needed[i] || operands(in.operation) == 0) continue;
-    needed[static_cast<std::size_t>(in.a)] = 1;
-    if (in.b >= 0) needed[static_cast<std::size_t>(in.b)] = 1;
-  }
-  std::vector<int> at(size, -1);
-  for (std::size_t i = 0; i < size; ++i) {
-    if (!needed[i]) continue;
-    const Instruction& in = of.code_[i];
-    const auto operand = [&](int k) { return k < 0 ? -1 : at[static_cast<std::size_t>(k)]; };
-    at[i] = operands(in.operation) == 0 ? copied(of, in, -1, -1) : copied(of, in, operand(in.a), operand(in.b));
-  }
-  const int first = at[static_cast<std::size_t>(a)];
-  keep_only_what_reaches(how == Operation::cos        ? operation(how, first, -1)
-                         : how == Operation::divide   ? operation(how, number(1), first)
-                         : how == Operation::subtract ? operation(how, first, at[static_cast<std::size_t>(b)])
-                         : how == Operation::number   ? operation(Operation::subtract, first, number(from))
-                                                      : first);
-}
+namespace {
 
 // The samples of a table at which its slope changes by a tenth of itself. Other tables follow smooth functions: some
 // samples stand for all.
-template <class CurveUse>
-static std::vector<double> corners(const CurveUse& use) {
+std::vector<double> corners(const Program::CurveUse& use) {
   constexpr double kPart = 0.1;
   constexpr std::size_t kSome = 32;
   std::vector<double> found;
@@ -52,11 +26,13 @@ static std::vector<double> corners(const CurveUse& use) {
   return found;
 }
 
-std::vector<Program> ProgramBuilder::switches_of(const Program& program) {
+}  // namespace
+
+std::vector<Program> switches_of(const Program& program) {
   using Switches = std::set<std::tuple<Operation, int, int, double>>;
   Switches all, choices;  // choices: where nothing but a denominator changes
   bool may_jump = false;
-  for (const Instruction& in : program.code_) {
+  for (const Program::Instruction& in : program.code()) {
     const auto kink = [&](Operation how, int a, int b = -1) { all.insert({how, a, b, 0}); };
     const auto choice = [&](Operation how, int a) { choices.insert({how, a, -1, 0}); };
     const auto jump = [&](Operation how, int a, int b = -1) { may_jump = true, kink(how, a, b); };
@@ -65,7 +41,7 @@ std::vector<Program> ProgramBuilder::switches_of(const Program& program) {
         jump(Operation::name, in.b);
         break;
       case Operation::power: {
-        const Instruction& exponent = program.code_[static_cast<std::size_t>(in.b)];
+        const Program::Instruction& exponent = program.code()[static_cast<std::size_t>(in.b)];
         const bool continuous = exponent.operation == Operation::number && exponent.constant >= 0;
         continuous ? choice(Operation::name, in.a) : jump(Operation::name, in.a);
         break;
@@ -108,12 +84,23 @@ std::vector<Program> ProgramBuilder::switches_of(const Program& program) {
   for (const auto& [how, a, b, from] : all) {
     Program result;
     const Symbols none;
-    ProgramBuilder(none, result).build_switch(program, how, a, b, from);
+    ProgramBuilder(none, result).build_part(program, a, how, b, from);
     if (!result.is_constant()) found.push_back(std::move(result));
   }
   return found;
 }
 
-std::vector<Program> switches_of(const Program& program) { return ProgramBuilder::switches_of(program); }
+std::vector<SampledFunction> sampled_functions_of(const Program& program) {
+  std::vector<SampledFunction> found;
+  const Symbols none;
+  std::map<int, Program> arguments;  // many functions have the same: those of parameters at the samples
+  for (const Program::Instruction& in : program.code()) {
+    if (in.operation != Operation::curve) continue;
+    const auto [argument, is_new] = arguments.try_emplace(in.a);
+    if (is_new) ProgramBuilder(none, argument->second).build_part(program, in.a);
+    found.push_back({program.curve_of(in), argument->second});
+  }
+  return found;
+}
 
 }  // namespace mbsopt

@@ -20,4 +20,12 @@ struct SwitchedProgram {
   std::vector<Program> switches;  // switches_of(program)
 };
 
+// A function through samples in a program (table(), spline(), signals and their derivatives), and the program of its
+// argument, which has the same inputs:  f.use.curve->at(f.argument.value(inputs, scratch), f.use.order)
+struct SampledFunction {
+  Program::CurveUse use;
+  Program argument;
+};
+std::vector<SampledFunction> sampled_functions_of(const Program& program);
+
 }  // namespace mbsopt

@@ -21,13 +21,15 @@ constexpr double kRounding = 1e-12;  // of the value
 constexpr double kNarrow = 1e-13;    // of the run: a jump
 constexpr std::size_t kMostPieces = 1 << 15;
 
+using Instruction = Program::Instruction;
+
 }  // namespace
 
-std::vector<Program> ProgramBuilder::time_parts_of(const Program& program, int parameters, int time) {
+std::vector<Program> time_parts_of(const Program& program, int parameters, int time) {
   enum Kind : char { fixed, linear, curved, sampled, of_motion };  // a value is at least as its operands are
   std::vector<Kind> kinds;
   std::set<std::pair<int, Operation>> parts;
-  for (const Instruction& in : program.code_) {
+  for (const Instruction& in : program.code()) {
     if (operands(in.operation) == 0) {
       const bool is_name = in.operation == Operation::name;
       kinds.push_back(!is_name || (in.a < parameters && in.a != time) ? fixed : in.a == time ? linear : of_motion);
@@ -54,13 +56,15 @@ std::vector<Program> ProgramBuilder::time_parts_of(const Program& program, int p
   std::vector<Program> found(parts.size());
   const Symbols none;
   auto part = found.begin();
-  for (const auto& [k, how] : parts) ProgramBuilder(none, *part++).build_switch(program, how, k, -1);
+  for (const auto& [k, how] : parts) ProgramBuilder(none, *part++).build_part(program, k, how);
   return found;
 }
 
+namespace {
+
 // The instructions that change with inputs whose rate is not 0 and that sums and products alone join to the result.
-std::vector<int> ProgramBuilder::terms_of(const Program& part, const std::vector<double>& rates) {
-  const std::vector<Instruction>& code = part.code_;
+std::vector<int> terms_of(const Program& part, const std::vector<double>& rates) {
+  const std::vector<Instruction>& code = part.code();
   std::vector<char> changes(code.size(), 0), joins(code.size(), 0);
   std::vector<int> terms;
   for (std::size_t i = 0; i < code.size(); ++i) {
@@ -84,12 +88,6 @@ std::vector<int> ProgramBuilder::terms_of(const Program& part, const std::vector
   return terms;
 }
 
-std::vector<Program> time_parts_of(const Program& program, int parameters, int time) {
-  return ProgramBuilder::time_parts_of(program, parameters, time);
-}
-
-namespace {
-
 // The inputs are x + rates t.
 std::vector<double> pieces_along(const Program& part, const std::vector<double>& x, const std::vector<double>& rates,
                                  double start, double end) {
@@ -99,7 +97,7 @@ std::vector<double> pieces_along(const Program& part, const std::vector<double>&
     double f[kSamples] = {};
   };
   std::vector<Term> terms;
-  for (const int k : ProgramBuilder::terms_of(part, rates)) terms.push_back({static_cast<std::size_t>(k)});
+  for (const int k : terms_of(part, rates)) terms.push_back({static_cast<std::size_t>(k)});
   Program::Scratch scratch = part.scratch();
   std::vector<double> inputs(x);
   std::vector<Range> input_ranges(x.size()), ranges;

@@ -15,7 +15,7 @@
 namespace mbsopt {
 
 // The inputs below `parameters` and the input `time` are those of the parts; others are the motion. Functions through
-// samples at instants a t + b are left out: their samples are known (sampled_functions.hpp). So is what is linear.
+// samples at instants a t + b are left out: their samples are known (program_switches.hpp). So is what is linear.
 std::vector<Program> time_parts_of(const Program& program, int parameters, int time);
 
 // x: the inputs of the part; that of time is overwritten. Returns start, the instants between, end.

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <functional>
 
-#include "core/expression/sampled_functions.hpp"
+#include "core/expression/program_switches.hpp"
 
 namespace mbsopt {
 namespace {
@@ -21,7 +21,8 @@ std::shared_ptr<const Curve> stretched(const Curve& f, double a, double b) {
 }  // namespace
 
 void add_kinks_in_time(const Program& program, int time, const Eigen::VectorXd& rho, std::vector<KinkedSignal>& kinks) {
-  for (const auto& [curve, order, argument] : sampled_functions_of(program)) {
+  for (const auto& [use, argument] : sampled_functions_of(program)) {
+    const auto& [curve, order] = use;
     if (curve->x().empty()) continue;  // a routine
     const Program slope = argument.derivative(time);
     KinkedSignal found{curve, 0, {}, curve->degree() - order};
