@@ -172,7 +172,7 @@ class FieldReader {
   void word(std::string_view key, std::string& value, const Words& allowed, const FieldInfo& info) {
     const PlacedNode given = get(key, info);
     if (given && read_string(given, value) && !has_word(allowed.available, value))
-      given.refuse(not_among(key, value, words(allowed.available), allowed.later));
+      given.refuse(not_among(key, value, words(allowed.available)));
   }
   template <class T, std::size_t N>
   void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const FieldInfo& info) {
@@ -184,15 +184,7 @@ class FieldReader {
       word = given->boolean ? "true" : "false";
     else if (!read_string(given, word))
       return;
-    std::vector<std::string> available;
-    for (const Choice<T>& choice : choices) {
-      if (choice.word == word) {
-        value = choice.value;
-        return;
-      }
-      available.emplace_back(choice.word);
-    }
-    given.refuse(not_among(key, word, available));
+    take(given, key, word, choices, value);
   }
   const TypeRow* type(std::string_view key, std::string_view, std::span<const TypeRow> rows, const FieldInfo& info) {
     const PlacedNode given = get(key, {info.description, Need::optional, {}});
@@ -277,16 +269,8 @@ class FieldReader {
     const PlacedNode given = get(key, info);
     if (!given) return;
     const std::string& word = given->string;  // "" of a number
-    std::vector<std::string> available;
-    for (const Choice<double>& choice : choices) {
-      if (word == choice.word) {
-        value = choice.value;
-        return;
-      }
-      available.emplace_back(choice.word);
-    }
     if (!word.empty() && std::isalpha(static_cast<unsigned char>(word[0])))
-      given.refuse(not_among(key, word, available) + ", or a number");
+      take(given, key, word, choices, value, ", or a number");
     else
       read_plain(given, value.emplace(), info.dimension);
   }
@@ -346,9 +330,6 @@ class FieldReader {
     if (given && (given->kind != Node::Kind::number || given->number != only))
       given.refuse("must be " + std::to_string(only) + ", found " + what_is(*given));
   }
-  void later(std::string_view key, std::string_view what) {
-    refuse(key, std::string(what) + " is not available in this version");
-  }
   void misplaced(std::string_view key, std::string_view where) { refuse(key, "is " + std::string(where)); }
   void rest_unknown() { rest_unknown_ = true; }
   // Reports, at the end of an object, unknown keys and missing required ones. An unknown key that resembles a missing
@@ -395,6 +376,20 @@ class FieldReader {
     if (!given) return;
     known_.emplace_back(key);
     given.refuse(message);
+  }
+
+  // Sets the value that a word stands for. `also` ends the finding about another word.
+  template <class T, std::size_t N>
+  static void take(const PlacedNode& given, std::string_view key, const std::string& word,
+                   const Choice<T> (&choices)[N], auto& value, const char* also = "") {
+    const auto found = std::ranges::find(choices, word, &Choice<T>::word);
+    if (found != std::end(choices)) {
+      value = found->value;
+      return;
+    }
+    std::vector<std::string> available;
+    for (const Choice<T>& choice : choices) available.emplace_back(choice.word);
+    given.refuse(not_among(key, word, available) + also);
   }
 
   // Returns the value of a key, which is known from now on. If it is absent, it returns nothing and reports a required

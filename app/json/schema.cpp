@@ -190,7 +190,6 @@ class SchemaWriter {
         {{"type", "object"}, {"propertyNames", names_pattern()}, {"additionalProperties", named_schema<T>()}});
   }
   void version(std::string_view key, int only, const FieldInfo& info) { put(key, info, {{"const", only}}); }
-  void later(std::string_view, std::string_view) {}
   void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 

@@ -17,28 +17,6 @@ constexpr std::size_t kStride = 1024;  // a line may be the whole file: columns 
 
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
 
-// The bytes of the UTF-8 sequence at `at`, or 0 if it is invalid (overlong forms, surrogates and beyond U+10FFFF are).
-std::size_t sequence_length(std::string_view text, std::size_t at) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
-  const unsigned b0 = byte(at), b1 = byte(at + 1);
-  const auto continues = [&](std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i)
-      if ((byte(at + i) & 0xC0u) != 0x80u) return false;
-    return true;
-  };
-  if (b0 < 0x80) return 1;
-  if (b0 >= 0xC2 && b0 <= 0xDF) return continues(1, 2) ? 2 : 0;
-  if (b0 >= 0xE0 && b0 <= 0xEF) {
-    const bool overlong = b0 == 0xE0 && b1 < 0xA0, surrogate = b0 == 0xED && b1 > 0x9F;
-    return continues(1, 3) && !overlong && !surrogate ? 3 : 0;
-  }
-  if (b0 >= 0xF0 && b0 <= 0xF4) {
-    const bool overlong = b0 == 0xF0 && b1 < 0x90, beyond = b0 == 0xF4 && b1 > 0x8F;
-    return continues(1, 4) && !overlong && !beyond ? 4 : 0;
-  }
-  return 0;
-}
-
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& message) {
   constexpr std::size_t kShown = 200;
   std::string name = file.string();
@@ -75,11 +53,21 @@ Position SourceText::position(std::size_t offset) const {
   return {static_cast<int>(line - line_starts_.begin()) + 1, static_cast<int>(characters) + 1};
 }
 
+// Overlong forms, surrogates and code points beyond U+10FFFF are invalid.
 std::size_t SourceText::first_invalid_byte() const {
-  for (std::size_t at = 0; at < content_.size();) {
-    const std::size_t length = sequence_length(content_, at);
-    if (length == 0) return at;
-    at += length;
+  constexpr unsigned kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // code point of a sequence of so many bytes
+  for (std::size_t at = 0, length = 1; at < content_.size(); at += length) {
+    const unsigned first = static_cast<unsigned char>(content_[at]);
+    length = first < 0x80 ? 1 : first < 0xC0 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF8 ? 4 : 0;
+    if (length == 1) continue;
+    if (length == 0 || at + length > content_.size()) return at;
+    unsigned code = first & (0x7Fu >> length);
+    for (std::size_t i = 1; i < length; ++i) {
+      const char c = content_[at + i];
+      if (!is_continuation(c)) return at;
+      code = code << 6 | (static_cast<unsigned char>(c) & 0x3Fu);
+    }
+    if (code < kLeast[length] || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return at;
   }
   return std::string::npos;
 }

@@ -29,25 +29,9 @@ struct Kind {
   const char* one;
   const char* all;
 };
-Kind kind_of(ElementKind what) {
-  switch (what) {
-    case ElementKind::body:
-      return {"body", "bodies"};
-    case ElementKind::joint:
-      return {"joint", "joints"};
-    case ElementKind::drive:
-      return {"drive", "drives"};
-    case ElementKind::force:
-      return {"force", "forces"};
-    case ElementKind::sensor:
-      return {"sensor", "sensors"};
-    case ElementKind::parameter:
-      return {"parameter", "parameters"};
-    case ElementKind::objective:
-      return {"objective", "objectives"};
-  }
-  return {"", ""};
-}
+constexpr Kind kKinds[kElementKinds] = {{"body", "bodies"},         {"joint", "joints"},   {"drive", "drives"},
+                                        {"force", "forces"},        {"sensor", "sensors"}, {"parameter", "parameters"},
+                                        {"objective", "objectives"}};
 
 constexpr std::size_t kLongestName = 255;  // bytes, as of a file: a problem's name becomes one
 
@@ -98,7 +82,7 @@ void Checker::must_be_identifier(const std::string& where, const std::string& na
 
 void Checker::check_reference(const std::string& where, const std::string& value, ElementKind what) {
   if (facts_.has(what, value)) return;
-  const auto [one, all] = kind_of(what);
+  const auto [one, all] = kKinds[static_cast<std::size_t>(what)];
   const std::string text = std::string("there is no ") + one + " '" + value + "'";
   if (issues_.size() >= kWithHints) return issue(where, text);
   const std::vector<std::string> names = facts_.names(what);
@@ -128,7 +112,7 @@ void Checker::word(std::string_view key, const std::string& value, const Words& 
   if (value.empty() && info.need == Need::required)
     issue(path(key), "is missing; available: " + joined(words(allowed.available)));
   else if (!value.empty() && !has_word(allowed.available, value))
-    issue(path(key), not_among(key, value, words(allowed.available), allowed.later));
+    issue(path(key), not_among(key, value, words(allowed.available)));
 }
 
 const TypeRow* Checker::type(std::string_view key, std::string_view current, std::span<const TypeRow> rows,
@@ -326,10 +310,6 @@ void Checker::time_law(std::string_view key, const Expression& value, const std:
   }
 }
 
-void Checker::check_range(std::string_view key, double value, const Range& range) {
-  check_number(path(key), value, range);
-}
-
 void Checker::check_number(const std::string& at, double value, const Range& range) {
   if (!std::isfinite(value))
     issue(at, "is " + text_of(value) + ", it must be finite");
@@ -342,24 +322,11 @@ void Checker::numbers(std::string_view key, const std::vector<double>& values, c
   for (std::size_t i = 0; i < values.size(); ++i) check_number(child_path(path(key), i), values[i], range);
 }
 
-void Checker::plain(std::string_view key, double value, const Range& range, const FieldInfo&) {
-  check_range(key, value, range);
-}
-void Checker::plain(std::string_view key, int value, const Range& range, const FieldInfo&) {
-  check_range(key, value, range);
-}
-void Checker::plain(std::string_view key, long value, const Range& range, const FieldInfo&) {
-  check_range(key, static_cast<double>(value), range);
-}
-void Checker::plain(std::string_view key, const std::optional<double>& value, const Range& range, const FieldInfo&) {
-  if (value) check_range(key, *value, range);
-}
-
 void Checker::values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values,
                         ElementKind what, const Range& range, const FieldInfo&) {
   for (const auto& [name, value] : values) {
     check_reference(child_path(path(key), name), name, what);
-    at(key).check_range(name, value, range);
+    check_number(child_path(path(key), name), value, range);
   }
 }
 

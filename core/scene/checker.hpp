@@ -73,12 +73,12 @@ class Checker {
                 const FieldInfo& info);
   void laws(std::string_view key, const LawVector& values, Scope names, const FieldInfo& info);
 
-  void plain(std::string_view key, double value, const Range& range, const FieldInfo& info);
-  void plain(std::string_view key, int value, const Range& range, const FieldInfo& info);
-  void plain(std::string_view key, long value, const Range& range, const FieldInfo& info);
-  void plain(std::string_view, bool, const Range&, const FieldInfo&) {}
-  void plain(std::string_view key, const std::optional<double>& value, const Range& range, const FieldInfo& info);
-  void plain(std::string_view key, const std::optional<long>& value, const Range& range, const FieldInfo& info) {
+  template <class T>
+  void plain(std::string_view key, const T& value, const Range& range, const FieldInfo&) {
+    if constexpr (!std::is_same_v<T, bool>) check_number(path(key), static_cast<double>(value), range);
+  }
+  template <class T>
+  void plain(std::string_view key, const std::optional<T>& value, const Range& range, const FieldInfo& info) {
     if (value) plain(key, *value, range, info);
   }
   template <std::size_t N>
@@ -120,7 +120,6 @@ class Checker {
     }
   }
   void version(std::string_view, int, const FieldInfo&) {}
-  void later(std::string_view, std::string_view) {}
   void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
@@ -134,7 +133,6 @@ class Checker {
  private:
   Checker at(std::string_view key) const { return {facts_, issues_, path(key)}; }
   void check_reference(const std::string& path, const std::string& value, ElementKind what);
-  void check_range(std::string_view key, double value, const Range& range);
   void check_number(const std::string& at, double value, const Range& range);
   void check_vector(const std::string& path, const VectorField& value, const std::optional<Dimension>& expected);
   bool names_are_known(const std::string& path, const Expression& value, Scope names);

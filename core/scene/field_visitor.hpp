@@ -130,7 +130,6 @@ class FieldVisitor {
       for (const T& value : values) visit(child_path(at(key), value.name), value);
   }
   void version(std::string_view, int, const FieldInfo&) {}
-  void later(std::string_view, std::string_view) {}
   void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 

@@ -24,35 +24,22 @@ bool knows(const Symbols& symbols, const std::string& name) {
   return symbols.input(name) >= 0 || symbols.definition(name);
 }
 
-template <class T>
-std::map<std::string, const T*> by_name(const std::vector<T>& all) {
-  std::map<std::string, const T*> table;
-  for (const T& one : all) table.emplace(one.name, &one);
-  return table;
-}
-
-template <class T>
-const T* found(const std::map<std::string, const T*>& table, const std::string& name) {
-  const auto it = table.find(name);
-  return it == table.end() ? nullptr : it->second;
-}
-
-template <class T>
-std::vector<std::string> names_of(const std::vector<T>& all) {
+std::vector<std::string> names_in(const auto& list) {
   std::vector<std::string> names;
-  for (const T& one : all) names.push_back(one.name);
+  for (const auto& one : list) names.push_back(one.name);
   return names;
 }
 
 }  // namespace
 
-SceneFacts::SceneFacts(const Scene& scene)
-    : scene_(scene),
-      bodies_(by_name(scene.bodies)),
-      joints_(by_name(scene.joints)),
-      drives_(by_name(scene.drives)),
-      forces_(by_name(scene.forces)),
-      sensors_(by_name(scene.sensors)) {
+SceneFacts::SceneFacts(const Scene& scene) : scene_(scene) {
+  set_names(ElementKind::body, names_in(scene.bodies));
+  set_names(ElementKind::joint, names_in(scene.joints));
+  set_names(ElementKind::drive, names_in(scene.drives));
+  set_names(ElementKind::force, names_in(scene.forces));
+  set_names(ElementKind::sensor, names_in(scene.sensors));
+  set_names(ElementKind::parameter, names_in(scene.parameters));
+  names_[at(ElementKind::body)].all.insert(names_[at(ElementKind::body)].all.begin(), "ground");
   for (const Parameter& parameter : scene.parameters) {
     if (none_.input(parameter.name) >= 0) continue;
     none_.add_input(parameter.name);
@@ -144,53 +131,11 @@ double SceneFacts::value_at(const Program& program) const {
   return program.value(values_, scratch_);
 }
 
-const Body* SceneFacts::body(const std::string& name) const { return found(bodies_, name); }
-const Joint* SceneFacts::joint(const std::string& name) const { return found(joints_, name); }
-const Drive* SceneFacts::drive(const std::string& name) const { return found(drives_, name); }
-const Force* SceneFacts::force(const std::string& name) const { return found(forces_, name); }
-const Sensor* SceneFacts::sensor(const std::string& name) const { return found(sensors_, name); }
-
-std::vector<std::string> SceneFacts::names(ElementKind what) const {
-  switch (what) {
-    case ElementKind::body: {
-      std::vector<std::string> all = names_of(scene_.bodies);
-      all.insert(all.begin(), "ground");
-      return all;
-    }
-    case ElementKind::joint:
-      return names_of(scene_.joints);
-    case ElementKind::drive:
-      return names_of(scene_.drives);
-    case ElementKind::force:
-      return names_of(scene_.forces);
-    case ElementKind::sensor:
-      return names_of(scene_.sensors);
-    case ElementKind::parameter:
-      return names_of(scene_.parameters);
-    case ElementKind::objective:
-      return objectives_;
-  }
-  return {};
-}
-
-bool SceneFacts::has(ElementKind what, const std::string& name) const {
-  switch (what) {
-    case ElementKind::body:
-      return name == "ground" || body(name);
-    case ElementKind::joint:
-      return joint(name);
-    case ElementKind::drive:
-      return drive(name);
-    case ElementKind::force:
-      return force(name);
-    case ElementKind::sensor:
-      return sensor(name);
-    case ElementKind::parameter:
-      return none_.input(name) >= 0;
-    case ElementKind::objective:
-      return std::find(objectives_.begin(), objectives_.end(), name) != objectives_.end();
-  }
-  return false;
+void SceneFacts::set_names(ElementKind what, const std::vector<std::string>& names) {
+  Names& of = names_[at(what)];
+  of.all = names;
+  of.place.clear();
+  for (std::size_t i = 0; i < names.size(); ++i) of.place.emplace(names[i], i);
 }
 
 const Symbols& SceneFacts::symbols(Scope names) const {
@@ -203,12 +148,9 @@ const Symbols& SceneFacts::symbols(Scope names) const {
       return rsda_law_;
     case Scope::time_law:
       return time_law_;
-    case Scope::state:
-    case Scope::sensor:
-    case Scope::objective:
+    default:  // expressions that may read sensors
       return objective_;
   }
-  return none_;
 }
 
 // This is faster than an attempt: the exception collects all names that resemble the wrong one.

@@ -25,14 +25,17 @@ class SceneFacts {
   const Scene& scene() const { return scene_; }
 
   // Return nullptr if nothing has that name. The ground counts as no body.
-  const Body* body(const std::string& name) const;
-  const Joint* joint(const std::string& name) const;
-  const Drive* drive(const std::string& name) const;
-  const Force* force(const std::string& name) const;
-  const Sensor* sensor(const std::string& name) const;
-  std::vector<std::string> names(ElementKind what) const;  // objectives: those added with add_objectives
-  bool has(ElementKind what, const std::string& name) const;
-  void add_objectives(std::vector<std::string> names) { objectives_ = std::move(names); }
+  const Body* body(const std::string& name) const { return found(scene_.bodies, ElementKind::body, name); }
+  const Joint* joint(const std::string& name) const { return found(scene_.joints, ElementKind::joint, name); }
+  const Drive* drive(const std::string& name) const { return found(scene_.drives, ElementKind::drive, name); }
+  const Force* force(const std::string& name) const { return found(scene_.forces, ElementKind::force, name); }
+  const Sensor* sensor(const std::string& name) const { return found(scene_.sensors, ElementKind::sensor, name); }
+  // The ground is among the names of bodies. Objectives are those added with add_objectives.
+  const std::vector<std::string>& names(ElementKind what) const { return names_[at(what)].all; }
+  bool has(ElementKind what, const std::string& name) const {
+    return names_[at(what)].place.contains(name) || (what == ElementKind::body && name == "ground");
+  }
+  void add_objectives(const std::vector<std::string>& names) { set_names(ElementKind::objective, names); }
 
   // Parameters, definitions, and the other names that an expression may use.
   const Symbols& symbols(Scope names) const;
@@ -81,13 +84,20 @@ class SceneFacts {
   std::vector<std::string> used_names(const Expression& expression, const Symbols& symbols) const;
   bool can_be_evaluated(const Expression& expression, const Symbols& symbols) const;
 
+  struct Names {
+    std::vector<std::string> all;
+    std::unordered_map<std::string, std::size_t> place;  // of the first element with a name in its list
+  };
+  static std::size_t at(ElementKind what) { return static_cast<std::size_t>(what); }
+  void set_names(ElementKind what, const std::vector<std::string>& names);
+  template <class T>
+  const T* found(const std::vector<T>& list, ElementKind what, const std::string& name) const {
+    const auto it = names_[at(what)].place.find(name);
+    return it == names_[at(what)].place.end() ? nullptr : &list[it->second];
+  }
+
   const Scene& scene_;
-  std::map<std::string, const Body*> bodies_;
-  std::map<std::string, const Joint*> joints_;
-  std::map<std::string, const Drive*> drives_;
-  std::map<std::string, const Force*> forces_;
-  std::map<std::string, const Sensor*> sensors_;
-  std::vector<std::string> objectives_;
+  std::array<Names, kElementKinds> names_;
   Symbols none_, tsda_law_, rsda_law_, time_law_, objective_;
   Symbols constants_;           // parameters, then definitions, all of them inputs
   std::vector<double> values_;  // of constants_

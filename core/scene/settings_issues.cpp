@@ -30,33 +30,31 @@ void check_options(Checker& checker, const IntegratorSettings& settings) {
   const IntegratorOptions& o = settings.options;
   const std::string path = checker.path("options");
   const Method* const method = runge_kutta_method(settings.type);
-  const auto refuse = [&](std::string_view key, bool given, const std::string& reason) {
-    if (given) checker.issue(child_path(path, key), "is given, but " + reason + "; leave it out");
-  };
-  const auto refuse_step_control = [&](const std::string& reason) {
-    refuse("factor_min", o.factor_min.has_value(), reason);
-    refuse("factor_max", o.factor_max.has_value(), reason);
-    refuse("safety", o.safety.has_value(), reason);
-    refuse("controller", !o.controller.empty(), reason);
-  };
-  const auto refuse_newton = [&](const std::string& reason) {
-    refuse("newton_tolerance", o.newton_tolerance.has_value(), reason);
-    refuse("newton_iterations", o.newton_iterations.has_value(), reason);
+  using Given = std::pair<std::string_view, bool>;
+  const Given min_step[] = {{"min_step", o.min_step.has_value()}};
+  const Given step_control[] = {{"factor_min", o.factor_min.has_value()},
+                                {"factor_max", o.factor_max.has_value()},
+                                {"safety", o.safety.has_value()},
+                                {"controller", !o.controller.empty()}};
+  const Given newton[] = {{"newton_tolerance", o.newton_tolerance.has_value()},
+                          {"newton_iterations", o.newton_iterations.has_value()}};
+  const auto refuse = [&](std::span<const Given> options, const std::string& reason) {
+    for (const auto& [key, given] : options)
+      if (given) checker.issue(child_path(path, key), "is given, but " + reason + "; leave it out");
   };
   if (settings.step) {
     const std::string fixed = "the step is fixed (step)";
-    refuse("min_step", o.min_step.has_value(), fixed);
-    refuse_step_control(fixed);
-    refuse_newton(fixed + ", and implicit stages are then solved to rounding");
-    return;
+    refuse(min_step, fixed);
+    refuse(step_control, fixed);
+    return refuse(newton, fixed + ", and implicit stages are then solved to rounding");
   }
   if (has_word(kMultistepMethods, settings.type)) {
-    refuse_step_control(settings.type + " chooses steps by rules of its own");
-    if (settings.type == "cvodes_adams") refuse_newton("cvodes_adams does not use Newton's method");
+    refuse(step_control, settings.type + " chooses steps by rules of its own");
+    if (settings.type == "cvodes_adams") refuse(newton, "cvodes_adams does not use Newton's method");
   } else if (method && !method->implicit()) {
-    refuse_newton(settings.type + " is explicit and does not use Newton's method");
+    refuse(newton, settings.type + " is explicit and does not use Newton's method");
   } else if (method && method->gamma) {
-    refuse_newton("the stages of " + settings.type + " solve linear equations, without Newton's method");
+    refuse(newton, "the stages of " + settings.type + " solve linear equations, without Newton's method");
   }
   for (const auto& [key, step] : {std::pair{"initial_step", settings.initial_step}, {"max_step", settings.max_step}}) {
     if (o.min_step && step && *o.min_step > *step)

@@ -157,14 +157,9 @@ bool has_word(std::string_view list, std::string_view word) {
   return any_word(list, [&](std::string_view w) { return w == word; });
 }
 
-std::string not_among(std::string_view what, std::string_view found, const std::vector<std::string>& available,
-                      std::string_view later) {
-  const std::string quoted = "'" + std::string(found) + "'";
-  const std::string list = "; available: " + joined(available);
-  if (has_word(later, found)) return std::string(what) + " " + quoted + " is not available in this version" + list;
-  std::vector<std::string> all = available;
-  for (const std::string& word : words(later)) all.push_back(word);
-  return quoted + " is not a known " + std::string(what) + did_you_mean(found, all) + list;
+std::string not_among(std::string_view what, std::string_view found, const std::vector<std::string>& available) {
+  return "'" + std::string(found) + "' is not a known " + std::string(what) + did_you_mean(found, available) +
+         "; available: " + joined(available);
 }
 
 bool ties_joints(const Joint& joint) { return joint.type == "gear" || joint.type == "rack_pinion"; }

@@ -60,9 +60,8 @@ std::vector<std::string> names_of(std::span<const TypeRow> rows);
 std::vector<std::string> words(std::string_view list);
 bool has_word(std::string_view list, std::string_view word);
 
-// "'gear' is not available in this version; available: revolute, spherical", or another message on a wrong choice.
-std::string not_among(std::string_view what, std::string_view found, const std::vector<std::string>& available,
-                      std::string_view later = "");
+// "'gaer' is not a known type (did you mean 'gear'?); available: revolute, gear"
+std::string not_among(std::string_view what, std::string_view found, const std::vector<std::string>& available);
 
 // Returns whether friction in a joint resists sliding: `motion` decides if given, else a joint without an angle slides.
 bool is_sliding(std::string_view motion, std::string_view joint_type);

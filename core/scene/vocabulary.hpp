@@ -32,7 +32,6 @@
 //   values_of(key, vector<pair<string, double>>&, To, Range, says)  numbers by the name of a parameter or body
 //   tolerance(key, double&, optional<KindTolerances>&, says)  a number, or one for each kind of component
 //   version(key, number, says)                  that number and no other
-//   later(key, what)                            in the problem format, not in this version
 //   misplaced(key, where)                       a field of other objects of this kind, which `where` names
 //   rest_unknown()                              the type is unknown, hence also the other fields
 #pragma once
@@ -57,6 +56,7 @@ struct FieldInfo {
 };
 
 enum class ElementKind { body, joint, drive, force, sensor, parameter, objective };
+inline constexpr std::size_t kElementKinds = 7;
 inline constexpr std::string_view kObjectiveKey = "objective";  // in the object of a reference_or
 
 // Names that an expression may use besides parameters and definitions.
@@ -77,7 +77,7 @@ struct Choice {
 };
 
 struct Words {
-  std::string_view available, later = "";
+  std::string_view available;
 };
 
 struct Range {
