@@ -10,7 +10,7 @@
 #include "app/terminal/text_table.hpp"
 #include "core/start/free_motion.hpp"
 #include "optim/fit/windows.hpp"
-#include "optim/problem/parameter_uses.hpp"
+#include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt::inline app {
 namespace {

@@ -2,14 +2,35 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "core/expression/operation.hpp"
 #include "core/scene/inertia_check.hpp"
 
 namespace mbsopt::inline app {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+std::string UniqueNames::add(const std::string& wanted) {
+  const bool identifier = kind_ == Kind::identifier;
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const auto is_refused = [&](char c) {
+    if (identifier) return !((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || is_digit(c));
+    return static_cast<unsigned char>(c) < ' ' || std::string(".,;\"'[]/\\").find(c) != std::string::npos;
+  };
+  std::string stem = wanted;
+  std::ranges::replace_if(stem, is_refused, '_');
+  if (identifier && (stem.empty() || is_digit(stem[0]))) stem.insert(0, "_");
+  if (stem.empty()) stem = "unnamed";
+  std::string name = stem;
+  for (int k = 2; std::ranges::find(taken_, name) != taken_.end() || find_function(name); ++k)
+    name = fmt::format("{}_{}", stem, k);
+  taken_.push_back(name);
+  if (renamed_ && name != wanted) renamed_->push_back(fmt::format("'{}' is named '{}'", wanted, name));
+  return name;
+}
 
 ModelBuilder::ModelBuilder(ModelFile& file, std::vector<ModelAttribute> table) : file_(file) {
   file.table = std::move(table);

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "app/import/imported_model.hpp"
-#include "app/import/unique_names.hpp"
 
 namespace mbsopt::inline app {
 

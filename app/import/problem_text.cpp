@@ -8,7 +8,6 @@
 
 #include "app/files/json_text.hpp"
 #include "app/import/imported_model.hpp"
-#include "app/import/unique_names.hpp"
 #include "core/expression/expression.hpp"
 #include "core/scene/type_table.hpp"
 

@@ -10,7 +10,7 @@
 #include "app/files/atomic_file.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "optim/problem/seed.hpp"
+#include "optim/problem/start_points.hpp"
 
 namespace mbsopt::inline app {
 namespace {

@@ -11,7 +11,7 @@
 #include "core/cvodes/cvodes.hpp"
 #include "core/run/timed_laws.hpp"
 #include "core/simulate/simulation_warnings.hpp"
-#include "optim/check/rounding_scatter.hpp"
+#include "optim/check/checked_run.hpp"
 #include "optim/check/taylor_remainders.hpp"
 #include "optim/check/user_terms.hpp"
 #include "optim/machine/stopwatch.hpp"

@@ -1,4 +1,4 @@
-#include "optim/check/rounding_scatter.hpp"
+#include "optim/check/checked_run.hpp"
 
 #include <fmt/format.h>
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/expression/curve.hpp"
 #include "core/expression/expression.hpp"
@@ -38,12 +39,8 @@ struct Direction {
   std::string name;       // "x of 'crank'"
 };
 
-Vector4d turned(const Vector4d& p, int axis) {
-  const Vector3d e = p.tail<3>(), w = Vector3d::Unit(axis);
-  Vector4d out;
-  out << -0.5 * e.dot(w), 0.5 * (p(0) * w + e.cross(w));
-  return out;
-}
+// The rate of p in a turn about an axis of the body at 1 rad/s.
+Vector4d turned(const Vector4d& p, int axis) { return 0.5 * G_transposed_times(p, Vector3d::Unit(axis)); }
 
 // q and v have 7 numbers each for the named bodies.
 std::vector<Direction> directions(const VectorXd& q, const VectorXd& v, const std::vector<std::string>& bodies) {

@@ -7,7 +7,7 @@
 
 #include "optim/design/tracked_squares.hpp"
 #include "optim/design/true_limits.hpp"
-#include "optim/problem/seed.hpp"
+#include "optim/problem/start_points.hpp"
 #include "optim/solver/ipopt_solver.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 #include "optim/solver/nlopt_solver.hpp"

@@ -1,6 +1,8 @@
 // The result of a comparison of two derivatives.
 #pragma once
 
+#include <cmath>
+#include <cstddef>
 #include <string_view>
 
 namespace mbsopt::inline optim {
@@ -12,8 +14,11 @@ enum class Verdict {
   failed,  // the differences could not be evaluated
   disagrees,
 };
-std::string_view to_string(
-    Verdict verdict);  // in this order: "agrees", "within its error", "zero", "FAILED", "DISAGREES"
+inline std::string_view to_string(Verdict verdict) {
+  constexpr std::string_view kNames[] = {"agrees", "within its error", "zero", "FAILED", "DISAGREES"};
+  return kNames[static_cast<std::size_t>(verdict)];
+}
+
 // Estimates of errors have the right size but are no bounds. A difference within some times of them is explained.
 inline constexpr double kEstimateTrust = 10;
 
@@ -21,6 +26,14 @@ inline bool passes(Verdict verdict) { return verdict != Verdict::failed && verdi
 
 // Compares a derivative that is known to `error` with its expected value: it agrees within threshold * entry. Its own
 // error, trusted to some times its estimate, counts only if it hides the entry at this threshold.
-Verdict verdict_of(double found, double error, double expected, double entry, double threshold);
+inline Verdict verdict_of(double found, double error, double expected, double entry, double threshold) {
+  if (!std::isfinite(found)) return Verdict::failed;
+  if (entry == 0 && found == 0) return Verdict::zero;
+  const double apart = std::abs(found - expected);
+  if (apart <= threshold * entry) return Verdict::agrees;
+  const double own = kEstimateTrust * error;
+  if (own > threshold * entry && apart <= own) return Verdict::buried;
+  return Verdict::disagrees;
+}
 
 }  // namespace mbsopt::inline optim

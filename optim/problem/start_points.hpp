@@ -12,12 +12,16 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <random>
 #include <vector>
 
 #include "core/scene/scene.hpp"
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt::inline optim {
+
+// A seed that is not given is drawn once and reported, so that any run can be repeated: 0 to 2^31 - 1, from the system.
+inline long drawn_seed() { return static_cast<long>(std::random_device()() & 0x7fffffffU); }
 
 // Returns count points of the unit cube, one per column.
 Eigen::MatrixXd unit_points(StartSampling sampling, Eigen::Index dimension, Eigen::Index count, long seed);

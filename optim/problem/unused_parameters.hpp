@@ -11,6 +11,7 @@
 // identification counts as if a sensor observed everything.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "core/scene/issues.hpp"
@@ -36,5 +37,12 @@ Problem what_measurements_need(const Problem& problem, std::vector<std::string>*
 // Finds variables of a design without effect on the objectives that it minimises or bounds. Finds variables and free
 // parameters of an identification without effect on its channels. They may affect other objectives of the problem.
 std::vector<SceneIssue> find_idle_variables(const Problem& problem);
+
+// The fields of a problem that each parameter enters, directly or through definitions.
+struct ParameterUse {
+  std::string parameter;
+  std::vector<std::string> fields;  // paths in the file: "bodies[2].mass", "drives[0].law"
+};
+std::vector<ParameterUse> parameter_uses(const Problem& problem);
 
 }  // namespace mbsopt::inline optim

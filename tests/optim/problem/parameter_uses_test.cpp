@@ -1,4 +1,4 @@
-#include "optim/problem/parameter_uses.hpp"
+#include "optim/problem/unused_parameters.hpp"
 
 #include <catch2/catch.hpp>
 
