@@ -29,7 +29,7 @@ constexpr double kApart = 0.05;        // the places along a step at which force
 constexpr double kNearPlaces = 1e-3;   // of a step: places as near to each other are one
 constexpr double kBeside = 1e-5;       // from the equilibrium, to see where the forces drive it [the same]
 constexpr double kTolerance = 1e-11;   // of the last Newton step [lengths of the mechanism, rad]
-constexpr double kRounding = 1e-14;    // of the terms of a force: a few additions
+constexpr double kRoundingOfForces = 1e-14;    // of the terms of a force: a few additions
 constexpr double kLargestError = 0.5;  // of a step, relative to it: the linear equations predict the rest
 constexpr double kAimedError = 0.25;   // the next step has about this one
 constexpr double kFastest = 0.02;      // of sigma: its largest change from a step to the next
@@ -223,7 +223,7 @@ struct FreeMotion {
   }
   // Returns whether F is rounding of the loads, and of stiff springs over a displacement of norm y.
   bool is_rounding(const VectorXd& F, double y) const {
-    return (F.array().abs() <= kRounding * (force_terms.array() + y * stiffness.norm())).all();
+    return (F.array().abs() <= kRoundingOfForces * (force_terms.array() + y * stiffness.norm())).all();
   }
 };
 
@@ -302,7 +302,7 @@ int leaving_body(Statics& statics, const FreeMotion& free, const VectorXd& q) {
   v *= kBeside / statics.size_of(free.N * v);
   const VectorXd xi = free.N * v;
   const double rounding =
-      kRounding * (v.cwiseAbs().dot(free.force_terms) + free.stiffness.norm() * v.squaredNorm() / kBeside);
+      kRoundingOfForces * (v.cwiseAbs().dot(free.force_terms) + free.stiffness.norm() * v.squaredNorm() / kBeside);
   for (const double side : {1.0, -1.0}) {
     if (!statics.evaluate_beside(q, side * xi) || !(side * v.dot(free.NM * statics.z()) > rounding)) continue;
     int body = 0;

@@ -25,7 +25,7 @@ class Gathered {
   }
 
   void add_running(double weight, const SecondOrder& x) {
-    const Jet m = objective_.integrand(x.value - shifted(x.value), part_);
+    const Derivatives m = objective_.integrand(x.value - shifted(x.value), part_);
     I_ += weight * m.value;
     I_rho_ += weight * m.first * x.first;
     I_rhorho_ += weight * (m.second * x.first * x.first.transpose() + m.first * x.second);
@@ -35,7 +35,7 @@ class Gathered {
   // d^2 psi/drho^2 = psi_I I_rhorho + psi_II I_rho I_rho'
   MatrixXd hessian() const {
     if (!objective_.mean() || I_ == 0) return I_rhorho_;
-    const Jet psi = objective_.of_integral(I_, part_);
+    const Derivatives psi = objective_.of_integral(I_, part_);
     return part_.factor * (psi.first * I_rhorho_ + psi.second * I_rho_ * I_rho_.transpose());
   }
 

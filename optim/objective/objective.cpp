@@ -41,7 +41,7 @@ class Integrand final : public PointCost {
       : x_(std::move(x)), kind_(kind), k_(k), x0_(x0) {}
   double value(const StatePoint& at) const override { return kind_.M(x_->value(at) - x0_, k_).value; }
   double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
-    const Jet m = kind_.M(x_->value(at) - x0_, k_);
+    const Derivatives m = kind_.M(x_->value(at) - x0_, k_);
     x_->add_gradient(at, scale * m.first, y_bar, rho_bar);
     return m.value;
   }
@@ -196,14 +196,14 @@ Cost Objective::cost(const Mechanism& mechanism, const ObjectivePart& part, doub
   return cost;
 }
 
-Jet Objective::of_integral(double I, const ObjectivePart& part, double x0) const {
+Derivatives Objective::of_integral(double I, const ObjectivePart& part, double x0) const {
   if (!running_ || !mean_) return {I, 1, 0};
-  const Jet n = mean_->N(I / duration_, exponent(part));
+  const Derivatives n = mean_->N(I / duration_, exponent(part));
   return {x0 + n.value, n.first / duration_, n.second / (duration_ * duration_)};
 }
 
-Jet Objective::integrand(double x, const ObjectivePart& part) const {
-  return mean_ ? mean_->M(x, exponent(part)) : Jet{x, 1, 0};
+Derivatives Objective::integrand(double x, const ObjectivePart& part) const {
+  return mean_ ? mean_->M(x, exponent(part)) : Derivatives{x, 1, 0};
 }
 
 double Objective::parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces) const {

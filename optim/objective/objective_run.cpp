@@ -160,7 +160,7 @@ SimulationResult run_objectives(const std::vector<Objective>& objectives, const 
   if (I_rho.size() > 0) result.psi_rho.setZero(result.psi.size(), I_rho.cols());
   Eigen::Index k = 0;
   for (const auto& [objective, row, part, x0] : integrals) {
-    const Jet mean = objective->of_integral(I(k), part, x0);
+    const Derivatives mean = objective->of_integral(I(k), part, x0);
     if (part.side != 0 && !std::isfinite(mean.value)) {
       result.status = SimulationStatus::not_finite;
       result.message = fmt::format(

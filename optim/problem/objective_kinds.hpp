@@ -19,7 +19,7 @@
 namespace mbsopt::inline optim {
 
 // A function of one number, and its first two derivatives.
-struct Jet {
+struct Derivatives {
   double value, first, second;
 };
 
@@ -27,19 +27,19 @@ enum class Extreme { none, maximum, minimum, both };
 
 struct MeanKind {
   std::string_view name, description;
-  Jet (*M)(double x, double k);
-  Jet (*N)(double m, double k);
+  Derivatives (*M)(double x, double k);
+  Derivatives (*N)(double m, double k);
   Extreme extreme = Extreme::none;
 };
 
-inline Jet exponential(double x, double k) {
+inline Derivatives exponential(double x, double k) {
   const double e = std::exp(k * x);
   return {e, k * e, k * k * e};
 }
-inline Jet logarithm(double m, double k) { return {std::log(m) / k, 1 / (k * m), -1 / (k * m * m)}; }
-inline Jet square(double x, double) { return {x * x, 2 * x, 2}; }
+inline Derivatives logarithm(double m, double k) { return {std::log(m) / k, 1 / (k * m), -1 / (k * m * m)}; }
+inline Derivatives square(double x, double) { return {x * x, 2 * x, 2}; }
 // At 0 there is no derivative; it is given as 0. Methods with negative weights may sum squares to -1e-33.
-inline Jet root(double m, double) {
+inline Derivatives root(double m, double) {
   if (m <= 0) return {0, 0, 0};
   const double x = std::sqrt(m);
   return {x, 0.5 / x, -0.25 / (x * m)};
