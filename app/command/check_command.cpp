@@ -152,7 +152,9 @@ void add_continuous(Json& result, const GradientCheck& check) {
                                  {"integrator", c.integrator},
                                  {"rtol", c.rtol},
                                  {"gradient", gradient_json(check, c.psi_rho)}};
-  verdict["method"] = c.method, verdict["against"] = c.discrete, verdict["rtol"] = c.rtol;
+  verdict["method"] = c.method;
+  verdict["against"] = c.discrete;
+  verdict["rtol"] = c.rtol;
   for (const ContinuousEntry& e : c.entries)
     verdict["entries"][e.objective][e.parameter] = {{"difference", e.difference}, {"verdict", to_string(e.verdict)}};
 }

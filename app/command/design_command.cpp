@@ -29,7 +29,8 @@ void add_to_result(Json& result, const DesignResult& design) {
   for (const DesignCase& c : design.cases) {
     Json& objective = result["cases"][c.name]["objectives"][design.objective];
     objective = objective_json(c.value, c.true_value);
-    objective["initial"] = c.initial, objective["weight"] = c.weight;
+    objective["initial"] = c.initial;
+    objective["weight"] = c.weight;
   }
   for (const DesignConstraint& c : design.constraints) {
     Json& objectives = c.load_case.empty() ? result["objectives"] : result["cases"][c.load_case]["objectives"];
@@ -41,7 +42,10 @@ void add_to_result(Json& result, const DesignResult& design) {
                  {"violation", c.violation},
                  {"price", c.price},
                  {"at_bound", bound_json(c.at_lower, c.at_upper)}};
-    if (c.true_value) objective["true_value"] = *c.true_value, objective["true_violation"] = c.true_violation;
+    if (c.true_value) {
+      objective["true_value"] = *c.true_value;
+      objective["true_violation"] = c.true_violation;
+    }
   }
   for (const DesignVariable& v : design.variables)
     result["parameters"][v.name] = {

@@ -62,7 +62,8 @@ void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
   for (std::size_t k = 1; k < efforts.table.columns.size(); ++k) {
     double least = INFINITY, largest = -INFINITY;
     for (const std::vector<double>& row : efforts.table.rows) {
-      least = std::min(least, row[k]), largest = std::max(largest, row[k]);
+      least = std::min(least, row[k]);
+      largest = std::max(largest, row[k]);
     }
     if (largest < least) continue;  // no number at all
     const std::string& name = efforts.table.columns[k];

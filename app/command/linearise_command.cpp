@@ -80,7 +80,10 @@ std::string moves_most(const Scene& scene, const Linearisation& x, const State& 
   const auto offer = [&](const Eigen::Vector3cd& moves, const std::string& body, const char* how) {
     Eigen::Index axis = 0;
     moves.cwiseAbs().maxCoeff(&axis);
-    if (moves.norm() > largest) largest = moves.norm(), words = body + how + "xyz"[axis];
+    if (moves.norm() > largest) {
+      largest = moves.norm();
+      words = body + how + "xyz"[axis];
+    }
   };
   int k = 0;
   for (const Body& body : scene.bodies) {
@@ -140,8 +143,10 @@ void show_modes(RunPage& page, const Json& modes) {
         im == 0 ? significant(re, 6) : fmt::format("{} +- {} i", significant(re, 6), significant(im, 6));
     table.add({std::to_string(table.rows().size() + 1), value, number_cell(f, 6), number_cell(m["damping_ratio"], 4),
                cell(m["moves_most"])});
-    slowest = std::min(slowest, f), fastest = std::max(fastest, f);
-    growth = std::max(growth, re), damping = std::min(damping, m["damping_ratio"].get<double>());
+    slowest = std::min(slowest, f);
+    fastest = std::max(fastest, f);
+    growth = std::max(growth, re);
+    damping = std::min(damping, m["damping_ratio"].get<double>());
   }
   page.verdict(
       fmt::format("{} from {:.4g} Hz to {:.4g} Hz; the least damping ratio is {:.3g} and the largest real part "

@@ -51,13 +51,19 @@ void add_objective(Sweep& sweep, const Problem& problem, const ObjectiveSpec& sp
   std::vector<std::string>& columns = sweep.table.columns;
   SweptObjective o{spec.name, std::move(unit), columns.size(), columns.size()};
   columns.push_back(spec.name);
-  if (spec.is_extreme()) o.judged = columns.size(), columns.push_back(spec.name + " true");
+  if (spec.is_extreme()) {
+    o.judged = columns.size();
+    columns.push_back(spec.name + " true");
+  }
   for (const Parameter* p : sweep.varied)
     if (gradients) columns.push_back("d " + spec.name + "/d " + p->name);
   if (problem.design) {
     if (spec.name == problem.design->minimize) sweep.best_by = sweep.objectives.size();
     const auto bound = std::ranges::find(problem.design->subject_to, spec.name, &ObjectiveBound::objective);
-    if (bound != problem.design->subject_to.end()) o.lower = bound->lower, o.upper = bound->upper;
+    if (bound != problem.design->subject_to.end()) {
+      o.lower = bound->lower;
+      o.upper = bound->upper;
+    }
   }
   sweep.has_limits = sweep.has_limits || o.lower || o.upper;
   sweep.objectives.push_back(std::move(o));
@@ -195,8 +201,12 @@ LinePlot plot_over(const Sweep& sweep, std::size_t varied, const SweptObjective&
   double low = INFINITY, high = -INFINITY;
   for (const Point* point : points) {
     const double value = (*point)[objective.judged];
-    all.x.push_back((*point)[1 + varied]), all.y.push_back(value);
-    if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
+    all.x.push_back((*point)[1 + varied]);
+    all.y.push_back(value);
+    if (std::isfinite(value)) {
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
   }
   LinePlot plot{.title = fmt::format("{} over {}", objective.title(), p.name),
                 .x_label = unit_label(p),

@@ -76,7 +76,8 @@ std::string without_member(const std::string& text, std::string_view path) {
     if (node->kind != Node::Kind::object) return text;
     const auto key = std::find(node->keys.begin(), node->keys.end(), step.key);
     if (key == node->keys.end()) return text;
-    parent = node, at = static_cast<std::size_t>(key - node->keys.begin());
+    parent = node;
+    at = static_cast<std::size_t>(key - node->keys.begin());
     node = &node->items[at];
   }
   if (!parent) return text;

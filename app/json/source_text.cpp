@@ -76,11 +76,13 @@ std::size_t SourceText::inside_string(std::size_t literal, std::size_t at) const
   std::size_t i = literal + 1;  // after the quote
   for (std::size_t value = 0; i < content_.size() && content_[i] != '"' && value < at;) {
     if (content_[i] != '\\') {
-      ++i, ++value;
+      ++i;
+      ++value;
       continue;
     }
     if (content_.compare(i, 2, "\\u") != 0) {
-      i += 2, ++value;
+      i += 2;
+      ++value;
       continue;
     }
     const unsigned long unit = std::strtoul(content_.substr(i + 2, 4).c_str(), nullptr, 16);

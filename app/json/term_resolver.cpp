@@ -95,7 +95,8 @@ class TermResolver {
   void resolve(UserCostSpec& cost, const std::string& place) {
     const NamedCost* const term = find(terms_.costs(), "cost", cost.cost, place + ".cost");
     if (!term) return;
-    cost.running = term->running, cost.terminal = term->terminal;
+    cost.running = term->running;
+    cost.terminal = term->terminal;
     order(cost.parameters, term->parameters, place);
   }
 

@@ -32,14 +32,19 @@ struct AxisRange {
   }
   // Ensures a range of nonzero length, with a little space at both ends.
   void finish(double air) {
-    if (low > high) low = 0, high = 1;
+    if (low > high) {
+      low = 0;
+      high = 1;
+    }
     const double smallest = 1e-12 * std::max(std::abs(low), std::abs(high));
     if (span() <= smallest) {
       const double half = low == 0 ? 1 : 0.1 * std::abs(low);
-      low -= half, high += half;
+      low -= half;
+      high += half;
     } else {
       const double margin = air * span();
-      low -= margin, high += margin;
+      low -= margin;
+      high += margin;
     }
   }
 };
@@ -156,7 +161,8 @@ class PathText {
   void dot() { text_ += "h0", command_ = 0; }
   void vertical(double down) {
     const long y = std::lround(kUnits * down);
-    text_ += fmt::format("v{}", y - y_), command_ = 0;
+    text_ += fmt::format("v{}", y - y_);
+    command_ = 0;
     y_ = y;
   }
   const std::string& text() const { return text_; }
@@ -166,8 +172,10 @@ class PathText {
     const long x = std::lround(kUnits * right), y = std::lround(kUnits * down);
     if (command != command_ || command == 'm') text_ += command;  // two places after one m are a line
     command_ = command;
-    add(x - x_), add(y - y_);
-    x_ = x, y_ = y;
+    add(x - x_);
+    add(y - y_);
+    x_ = x;
+    y_ = y;
   }
 
   // Writes a space if no sign separates a number from the one before.

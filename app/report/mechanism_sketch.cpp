@@ -140,8 +140,10 @@ class SketchMaker {
 
   void add_points_of(const Sensor& sensor) {
     if (!sensor.body.empty()) add(sensor.body, sensor.point);
-    if (!sensor.body1.empty() && !sensor.body2.empty())
-      add(sensor.body1, sensor.point1), add(sensor.body2, sensor.point2);
+    if (!sensor.body1.empty() && !sensor.body2.empty()) {
+      add(sensor.body1, sensor.point1);
+      add(sensor.body2, sensor.point2);
+    }
     if (sensor.quantity != "position") return;
     const SketchPoint p = point(sensor.body, sensor.point);
     if (p.body == kGround || std::ranges::count(result_.traces, p, &TracedPoint::point) > 0) return;

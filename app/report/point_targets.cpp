@@ -61,7 +61,10 @@ std::vector<PointTarget> prescribed_points(const Problem& problem, const std::ve
       }
       std::ranges::stable_sort(rows, {}, &std::pair<double, double>::first);
       SensorValues& v = values.emplace_back(SensorValues{term.sensor, {}, {}});
-      for (const auto& [t, value] : rows) v.t.push_back(t), v.value.push_back(value);
+      for (const auto& [t, value] : rows) {
+        v.t.push_back(t);
+        v.value.push_back(value);
+      }
     }
   }
   return point_targets(problem.scene, values, false);

@@ -26,7 +26,8 @@ struct RowAxis {
         if (std::isfinite(x)) low = std::min(low, x), high = std::max(high, x);
     }
     const double air = high > low ? 0.05 * (high - low) : 1;
-    low -= air, high += air;
+    low -= air;
+    high += air;
   }
   std::string percent(double x) const {
     return fmt::format("{:.5g}%", 100 * (std::clamp(std::isnan(x) ? low : x, low, high) - low) / (high - low));

@@ -29,11 +29,13 @@ void measure(RecordedChannel& column) {
   d.samples = column.times.size();
   if (d.samples == 0) return;
   const auto [least, most] = std::ranges::minmax(column.measured);
-  d.least = least, d.most = most;
+  d.least = least;
+  d.most = most;
   std::vector<double> intervals;
   for (std::size_t i = 1; i < column.times.size(); ++i) intervals.push_back(column.times[i] - column.times[i - 1]);
   if (intervals.empty()) return;
-  d.gap = std::ranges::max(intervals), d.interval = median(std::move(intervals));
+  d.gap = std::ranges::max(intervals);
+  d.interval = median(std::move(intervals));
 }
 
 }  // namespace
@@ -87,7 +89,8 @@ void add_residuals(std::vector<ChannelData>& channels, const Problem& problem, c
   std::vector<double> squares(channels.size()), samples(channels.size());
   for (const ResidualRow& row : start.residuals) {
     const std::size_t k = first[row.experiment] + row.channel;
-    squares[k] += row.scaled * row.scaled, ++samples[k];
+    squares[k] += row.scaled * row.scaled;
+    ++samples[k];
   }
   for (std::size_t k = 0; k < channels.size(); ++k)
     if (samples[k] > 0) channels[k].rms_scaled = std::sqrt(squares[k] / samples[k]);
@@ -136,7 +139,8 @@ void add_windows(Run& run, const Problem& cut) {
     if (!e.origin) continue;
     Json& windows = run.result["windows"][e.origin->experiment];
     if (windows.is_null()) windows = {{"start_time", *e.start_time}};
-    windows["count"] = e.origin->number, windows["end_time"] = *e.end_time;
+    windows["count"] = e.origin->number;
+    windows["end_time"] = *e.end_time;
   }
   if (!run.result.contains("windows")) return;
   for (const auto& [name, windows] : run.result["windows"].items())

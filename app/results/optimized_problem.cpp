@@ -82,7 +82,10 @@ class SettingsWriter {
 Json integrator_json(const IntegratorSettings& s) {
   SettingsWriter writer;
   describe(writer, s);
-  if (s.step) writer.json.erase("rtol"), writer.json.erase("atol");
+  if (s.step) {
+    writer.json.erase("rtol");
+    writer.json.erase("atol");
+  }
   if (s.max_steps == IntegratorSettings{}.max_steps) writer.json.erase("max_steps");
   return writer.json;
 }
@@ -90,7 +93,10 @@ Json integrator_json(const IntegratorSettings& s) {
 Json formulation_json(const FormulationSettings& f) {
   SettingsWriter writer;
   describe(writer, f);
-  if (f.type == FormulationType::penalty) writer.json.erase("iterations"), writer.json.erase("tolerance");
+  if (f.type == FormulationType::penalty) {
+    writer.json.erase("iterations");
+    writer.json.erase("tolerance");
+  }
   return writer.json;
 }
 

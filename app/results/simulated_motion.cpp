@@ -183,7 +183,8 @@ void write_sensitivities(Run& run) {
   run.progress.finish();
   if (result.status == SimulationStatus::stopped) return run.stopped("there is no sensitivities.csv");
   if (!result.ok()) return run.failed("no sensitivities: " + result.message, result.last_good_time);
-  table.rows.swap(rows), rows.clear();
+  table.rows.swap(rows);
+  rows.clear();
   run.write("sensitivities.csv", to_csv(table));
   // Steps across a kink do not know its instant: other tolerances tell whether that matters.
   const auto kink = std::ranges::find(result.statistics.jumps, 0.0, &Jump::size);
@@ -193,9 +194,10 @@ void write_sensitivities(Run& run) {
   constexpr double kResolved = 1e-4;  // of a column: as of gradients
   for (std::size_t c = 1; c < table.columns.size(); ++c) {
     double largest = 0, change = 0;
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      largest = std::max(largest, std::abs(rows[i][c])),
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      largest = std::max(largest, std::abs(rows[i][c]));
       change = std::max(change, std::abs(rows[i][c] - table.rows[i][c]));
+    }
     if (change > kResolved * largest)
       return run.warn(
           fmt::format("the steps do not resolve the sensitivities: a tenth of the integration errors changes "

@@ -52,7 +52,8 @@ VariedRange range_of(const Scene& scene, const std::string& option) {
   if (!(low < high)) refuse("--vary {}: {} is not below {}", option, low, high);
   if (range.parameter.scale != ParameterScale::linear && !(low > 0))
     refuse("--vary {}: the scale of '{}' is logarithmic, so its values are above 0", option, range.parameter.name);
-  range.parameter.lower = low, range.parameter.upper = high;
+  range.parameter.lower = low;
+  range.parameter.upper = high;
   if (parts.size() == 4) {
     const double count = number_in(parts[3], option);
     if (!(count >= 2 && count <= static_cast<double>(kMostPoints)) || count != std::floor(count))

@@ -75,7 +75,8 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
   DesignOptions options;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [](const DesignRow&) { return !interrupted(); };
-  options.scale = scale, options.mode = mode;
+  options.scale = scale;
+  options.mode = mode;
   options.compare_differences = false;  // once, at the best one's start
   options.evaluate_stopped = false;     // a worker that is stopped must reply soon
   const DesignResult design = run_design(problem, options);
@@ -93,8 +94,10 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
   if (design.status == SolverStatus::converged) record["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
   if (design.mode) record["assembly_mode"] = mode_json(*design.mode);
   if (design.closing_steps > 0) record["closing_steps"] = design.closing_steps;
-  for (const DesignVariable& v : design.variables)
-    record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
+  for (const DesignVariable& v : design.variables) {
+    record["from"][v.name] = v.initial;
+    record["parameters"][v.name] = v.value;
+  }
   return record;
 }
 
@@ -199,7 +202,8 @@ DesignOutcome best_of_starts(LongRun& long_run, const Problem& seeded, const Eig
     result.design = run_design(from(0), until_interrupted);
   }
   // The repeated run is no further search.
-  result.design.simulations = outcome.simulations, result.design.wall_seconds = outcome.wall_seconds;
+  result.design.simulations = outcome.simulations;
+  result.design.wall_seconds = outcome.wall_seconds;
   return result;
 }
 

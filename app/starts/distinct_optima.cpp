@@ -77,7 +77,10 @@ double SearchedOptima::covered() const {
 
 SearchedOptima searched(const std::vector<DistinctOptimum>& optima) {
   SearchedOptima found;
-  for (const DistinctOptimum& o : optima) found.searches += o.starts, ++found.optima;
+  for (const DistinctOptimum& o : optima) {
+    found.searches += o.starts;
+    ++found.optima;
+  }
   return found;
 }
 

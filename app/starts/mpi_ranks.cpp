@@ -38,9 +38,14 @@ class OpenMpi {
  public:
   OpenMpi() : library_(::dlopen(kLibrary, RTLD_NOW | RTLD_GLOBAL | RTLD_DEEPBIND)) {
     if (!library_) throw std::runtime_error(fmt::format("Open MPI cannot be loaded: {}", ::dlerror()));
-    find(init, "MPI_Init"), find(finalize, "MPI_Finalize");
-    find(comm_rank, "MPI_Comm_rank"), find(comm_size, "MPI_Comm_size");
-    find(send, "MPI_Send"), find(recv, "MPI_Recv"), find(iprobe, "MPI_Iprobe"), find(get_count, "MPI_Get_count");
+    find(init, "MPI_Init");
+    find(finalize, "MPI_Finalize");
+    find(comm_rank, "MPI_Comm_rank");
+    find(comm_size, "MPI_Comm_size");
+    find(send, "MPI_Send");
+    find(recv, "MPI_Recv");
+    find(iprobe, "MPI_Iprobe");
+    find(get_count, "MPI_Get_count");
     world = static_cast<MPI_Comm>(symbol("ompi_mpi_comm_world"));
     character = static_cast<MPI_Datatype>(symbol("ompi_mpi_char"));
   }
@@ -74,7 +79,8 @@ class MpiRanks : public Ranks {
  public:
   MpiRanks() {
     mpi_.init(nullptr, nullptr);
-    mpi_.comm_rank(mpi_.world, &rank_), mpi_.comm_size(mpi_.world, &size_);
+    mpi_.comm_rank(mpi_.world, &rank_);
+    mpi_.comm_size(mpi_.world, &size_);
   }
   ~MpiRanks() override { mpi_.finalize(); }
 

@@ -26,7 +26,7 @@ void set_integrator(Problem& problem, const Json& integrator) {
   SimulationSettings& settings = problem.scene.simulation;
   settings.accuracy.reset();
   settings.integrator.type = integrator.at("type").get<std::string>();
-  settings.integrator.rtol = integrator.at("rtol").get<double>(),
+  settings.integrator.rtol = integrator.at("rtol").get<double>();
   settings.integrator.atol = integrator.at("atol").get<double>();
 }
 

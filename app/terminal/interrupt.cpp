@@ -64,7 +64,9 @@ void listen() {
 }  // namespace
 
 InterruptGuard::InterruptGuard() {
-  flag = false, listening = false, guarded = true;
+  flag = false;
+  listening = false;
+  guarded = true;
   install(SIGPIPE, on_broken_pipe, pipe_before);
   install(SIGXFSZ, SIG_IGN, file_size_before);
 }
@@ -74,7 +76,8 @@ InterruptGuard::~InterruptGuard() {
     for (const Caught& c : caught) ::sigaction(c.signal, &c.before, nullptr);
   ::sigaction(SIGPIPE, &pipe_before, nullptr);
   ::sigaction(SIGXFSZ, &file_size_before, nullptr);
-  guarded = false, listening = false;
+  guarded = false;
+  listening = false;
 }
 
 bool interrupted() {

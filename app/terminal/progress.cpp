@@ -59,7 +59,11 @@ Progress::~Progress() {
 // The time left at the speed since the first fraction of the same task. The first hundredth gives no speed yet.
 std::string Progress::left_of(std::string_view what, double done, double now) {
   constexpr double kTells = 0.01;
-  if (what != doing_ || done < done_) doing_ = what, began_ = now, done_ = done;
+  if (what != doing_ || done < done_) {
+    doing_ = what;
+    began_ = now;
+    done_ = done;
+  }
   if (now - began_ < kAtFirst || done - done_ < kTells) return "";
   return fmt::format(", {:.0f} s left", (now - began_) * (1 - done) / (done - done_));
 }
@@ -73,7 +77,8 @@ void Progress::fraction(std::string_view what, double done) {
   const std::string left = left_of(what, std::clamp(done, 0.0, 1.0), now);
   if (now - said_ < (stands ? kAtFirst : patience_)) return;
   if (!terminal_) return break_silence(fmt::format("{}: {:.3g} %", what, percent), now, left);
-  shown_percent_ = whole, said_ = now;
+  shown_percent_ = whole;
+  said_ = now;
   const int filled = whole * kBarWidth / 100;
   draw(fmt::format("{} [{:#>{}}{:.>{}}] {:3d} %", what, "", filled, "", kBarWidth - filled, whole),
        (stands ? in_seconds(now - start_) : "") + left);
@@ -96,7 +101,8 @@ void Progress::time(std::string_view what, double t) {
 
 void Progress::break_silence(std::string_view words, double now, const std::string& left) {
   err_ << fmt::format("{} after {:.0f} s{}\n", words, now - start_, left) << std::flush;
-  said_ = now, patience_ = std::min(2 * patience_, kLongest);
+  said_ = now;
+  patience_ = std::min(2 * patience_, kLongest);
 }
 
 void Progress::draw(std::string_view line, const std::string& end) {
@@ -109,7 +115,8 @@ void Progress::draw(std::string_view line, const std::string& end) {
 
 void Progress::iteration(std::string_view line) {
   if (quiet_) return;
-  said_ = seconds_(), patience_ = terminal_ ? kIterationStays : kAtFirst;
+  said_ = seconds_();
+  patience_ = terminal_ ? kIterationStays : kAtFirst;
   shown_percent_ = -1;
   const std::string elapsed = in_seconds(said_ - start_);
   if (terminal_) return draw(line, elapsed);

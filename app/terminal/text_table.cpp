@@ -60,7 +60,8 @@ TextTable table_of(const Json& rows, const std::vector<Column>& columns) {
       return row.contains(pointer(column)) && !row[pointer(column)].is_null();
     };
     if (column.if_any && std::none_of(rows.begin(), rows.end(), has_it)) continue;
-    header.push_back(column.header), shown.push_back(column);
+    header.push_back(column.header);
+    shown.push_back(column);
   }
   TextTable table(header);
   for (const auto& [name, entries] : rows.items()) {

@@ -72,8 +72,13 @@ EIGEN_ALWAYS_INLINE Jet<Vector3d> point(const Frame& f, const Vector3d& s) {
 }
 EIGEN_ALWAYS_INLINE Jet<DualVector> point(const DualFrame& f, const BodyVector& s) {
   Jet<DualVector> x = turned(f, s);
-  x.x.v += f.f.r, x.xd.v += f.f.rdot, x.xdd.v += f.f.rddot;
-  if (!f.t.still) x.x.d += f.t.r, x.xd.d += f.t.rdot;
+  x.x.v += f.f.r;
+  x.xd.v += f.f.rdot;
+  x.xdd.v += f.f.rddot;
+  if (!f.t.still) {
+    x.x.d += f.t.r;
+    x.xd.d += f.t.rdot;
+  }
   return x;
 }
 // P2 - P1

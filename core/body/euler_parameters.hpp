@@ -20,9 +20,15 @@ inline Matrix3d A(const Vector4d& p) {
   const double e0 = p(0), e1 = p(1), e2 = p(2), e3 = p(3);
   const double d = e0 * e0 - (e1 * e1 + e2 * e2 + e3 * e3);
   Matrix3d R;
-  R(0, 0) = d + 2 * e1 * e1, R(1, 0) = 2 * (e1 * e2 + e0 * e3), R(2, 0) = 2 * (e1 * e3 - e0 * e2);
-  R(0, 1) = 2 * (e1 * e2 - e0 * e3), R(1, 1) = d + 2 * e2 * e2, R(2, 1) = 2 * (e2 * e3 + e0 * e1);
-  R(0, 2) = 2 * (e1 * e3 + e0 * e2), R(1, 2) = 2 * (e2 * e3 - e0 * e1), R(2, 2) = d + 2 * e3 * e3;
+  R(0, 0) = d + 2 * e1 * e1;
+  R(1, 0) = 2 * (e1 * e2 + e0 * e3);
+  R(2, 0) = 2 * (e1 * e3 - e0 * e2);
+  R(0, 1) = 2 * (e1 * e2 - e0 * e3);
+  R(1, 1) = d + 2 * e2 * e2;
+  R(2, 1) = 2 * (e2 * e3 + e0 * e1);
+  R(0, 2) = 2 * (e1 * e3 + e0 * e2);
+  R(1, 2) = 2 * (e2 * e3 - e0 * e1);
+  R(2, 2) = d + 2 * e3 * e3;
   return R;
 }
 
@@ -32,9 +38,15 @@ inline Matrix3d B(const Vector4d& p, const Vector4d& w) {
   const double s12 = e1 * f2 + e2 * f1, s13 = e1 * f3 + e3 * f1, s23 = e2 * f3 + e3 * f2;
   const double t1 = e0 * f1 + f0 * e1, t2 = e0 * f2 + f0 * e2, t3 = e0 * f3 + f0 * e3;
   Matrix3d R;
-  R(0, 0) = d + 4 * e1 * f1, R(1, 0) = 2 * (s12 + t3), R(2, 0) = 2 * (s13 - t2);
-  R(0, 1) = 2 * (s12 - t3), R(1, 1) = d + 4 * e2 * f2, R(2, 1) = 2 * (s23 + t1);
-  R(0, 2) = 2 * (s13 + t2), R(1, 2) = 2 * (s23 - t1), R(2, 2) = d + 4 * e3 * f3;
+  R(0, 0) = d + 4 * e1 * f1;
+  R(1, 0) = 2 * (s12 + t3);
+  R(2, 0) = 2 * (s13 - t2);
+  R(0, 1) = 2 * (s12 - t3);
+  R(1, 1) = d + 4 * e2 * f2;
+  R(2, 1) = 2 * (s23 + t1);
+  R(0, 2) = 2 * (s13 + t2);
+  R(1, 2) = 2 * (s23 - t1);
+  R(2, 2) = d + 4 * e3 * f3;
   return R;
 }
 

@@ -38,7 +38,9 @@ void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v
   out.Addot += other;
   set_B(body.pdot, pdot_dir, 2, other);
   out.Addot += other;
-  out.p = p_dir, out.pdot = pdot_dir, out.pddot = pddot_dir;
+  out.p = p_dir;
+  out.pdot = pdot_dir;
+  out.pddot = pddot_dir;
   out.still = false;
 }
 
@@ -69,15 +71,27 @@ void set_unit_tangents(const BodyState& body, UnitTangents& out) {
 }
 
 void FrameBar::set_zero() {
-  r.setZero(), rdot.setZero();
-  A.setZero(), Adot.setZero(), Addot.setZero(), A_eta.setZero();
-  p.setZero(), pdot.setZero(), pddot.setZero(), p_eta.setZero();
+  r.setZero();
+  rdot.setZero();
+  A.setZero();
+  Adot.setZero();
+  Addot.setZero();
+  A_eta.setZero();
+  p.setZero();
+  pdot.setZero();
+  pddot.setZero();
+  p_eta.setZero();
 }
 
 void FrameTangent::set_zero() {
-  r.setZero(), rdot.setZero();
-  A.setZero(), Adot.setZero(), Addot.setZero();
-  p.setZero(), pdot.setZero(), pddot.setZero();
+  r.setZero();
+  rdot.setZero();
+  A.setZero();
+  Adot.setZero();
+  Addot.setZero();
+  p.setZero();
+  pdot.setZero();
+  pddot.setZero();
   still = true;
 }
 

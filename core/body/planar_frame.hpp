@@ -47,7 +47,9 @@ inline void fold_virtual(const PlanarFrame<double>& f, PlanarFrameBar& bar) {
 inline void add_vector_bar(const PlanarFrame<double>& f, const Plane& s, const MovedJet<Plane>& bar, double sign,
                            PlanarFrameBar& frame_bar, Plane& s_bar) {
   const Plane st = conj(sign * s);
-  frame_bar.A += bar.x * st, frame_bar.Adot += bar.xd * st, frame_bar.Addot += bar.xdd * st;
+  frame_bar.A += bar.x * st;
+  frame_bar.Adot += bar.xd * st;
+  frame_bar.Addot += bar.xdd * st;
   frame_bar.A_eta += bar.x_eta * st;
   s_bar +=
       sign * (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd + conj(f.turned(f.A)) * bar.x_eta);

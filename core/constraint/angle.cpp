@@ -41,8 +41,10 @@ void Angle::pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z,
   const double D = C.x * C.x + S.x * S.x, D2 = D * D, N = C.x * S.xd - S.x * C.xd, E = C.x * C.xd + S.x * S.xd;
   const double lambda = z.lambda(0), mu0 = z.mu0(0), mu1 = z.mu1(0), mu2 = z.mu2(0);
   Multipliers<1> zC, zS;
-  zC.lambda(0) = -lambda * S.x / D, zS.lambda(0) = lambda * C.x / D;
-  zC.mu2(0) = -mu2 * S.x / D, zS.mu2(0) = mu2 * C.x / D;
+  zC.lambda(0) = -lambda * S.x / D;
+  zS.lambda(0) = lambda * C.x / D;
+  zC.mu2(0) = -mu2 * S.x / D;
+  zS.mu2(0) = mu2 * C.x / D;
   zC.mu1(0) = -mu1 * S.x / D - 2 * mu2 * (C.x * N - S.x * E) / D2;
   zS.mu1(0) = mu1 * C.x / D - 2 * mu2 * (S.x * N + C.x * E) / D2;
   // Derivatives of (C S_x - S C_x)/D for x = eta, dot, ddot, of atan2, and of the last term of Phiddot, in C and in S.

@@ -95,7 +95,9 @@ void SingleRow<P>::tangent(const Frame& f1, const Frame& f2, const FrameTangent&
   const P& p = static_cast<const P&>(*this);
   const Vectors<BodyVector> vectors{{p.s1, s.s1}, {p.s2, s.s2}, {third(p), s.s3}};
   const Row<DualVector> row = row_of(p, DualFrame{f1, t1}, DualFrame{f2, t2}, vectors);
-  out.phi = lanes(row.phi.x), out.phi_dot = lanes(row.phi.xd), out.phi_ddot = lanes(row.phi.xdd);
+  out.phi = lanes(row.phi.x);
+  out.phi_dot = lanes(row.phi.xd);
+  out.phi_ddot = lanes(row.phi.xdd);
   const Lanes<3> dF = lambda(0) * row.force.d;
   out.load1 << -dF, lambda(0) * row.moment1.d;
   out.load2 << dF, lambda(0) * row.moment2.d;

@@ -43,7 +43,9 @@ void Coincidence::tangent(const Frame& f1, const Frame& f2, const FrameTangent& 
   const DualFrame g1{f1, t1}, g2{f2, t2};
   const BodyVector v1{s1, s.s1}, v2{s2, s.s2};
   const Jet<DualVector> d = separation(g1, g2, v1, v2);
-  out.phi = d.x.d, out.phi_dot = d.xd.d, out.phi_ddot = d.xdd.d;
+  out.phi = d.x.d;
+  out.phi_dot = d.xd.d;
+  out.phi_ddot = d.xdd.d;
   out.load1 << Lanes<3>::Zero(), -moment(g1, v1, lambda).d;
   out.load2 << Lanes<3>::Zero(), moment(g2, v2, lambda).d;
 }
@@ -51,11 +53,14 @@ void Coincidence::tangent(const Frame& f1, const Frame& f2, const FrameTangent& 
 void Coincidence::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,
                                  const Vec<3>& lambda, TurningBlocks<3>& out) const {
   const VectorBlocks x(b1, f1, s1), y(b2, f2, s2);
-  out.p1 = -x.xdd_p, out.pdot1 = -x.xdd_pdot;
-  out.p2 = y.xdd_p, out.pdot2 = y.xdd_pdot;
+  out.p1 = -x.xdd_p;
+  out.pdot1 = -x.xdd_pdot;
+  out.p2 = y.xdd_p;
+  out.pdot2 = y.xdd_pdot;
   out.moment1_p1 = -skew(s1) * N_transposed(b1.p, lambda);
   out.moment2_p2 = skew(s2) * N_transposed(b2.p, lambda);
-  out.moment1_p2.setZero(), out.moment2_p1.setZero();
+  out.moment1_p2.setZero();
+  out.moment2_p1.setZero();
 }
 
 }  // namespace mbsopt

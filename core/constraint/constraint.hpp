@@ -44,7 +44,10 @@ struct Constraint {
     std::visit(
         [&](const auto& p) {
           if constexpr (requires { p.s1; }) {
-            if (p.quantity() == RowQuantity::length) f(body1, p.s1), f(body2, p.s2);
+            if (p.quantity() == RowQuantity::length) {
+              f(body1, p.s1);
+              f(body2, p.s2);
+            }
           }
         },
         primitive);

@@ -133,7 +133,8 @@ void Adjoint::take_sample(const SampleEvent& event, const StatePoint& at) {
 // too much: it may belong to the first steps of a motion that dies out at once.
 void Adjoint::take_step(const StatePoint& at) {
   for (const Eigen::Index o : run_.running()) {
-    y_bar_.setZero(), rho_bar_.setZero();
+    y_bar_.setZero();
+    rho_bar_.setZero();
     costs_[static_cast<std::size_t>(o)].running->add_gradient(at, 1, y_bar_, rho_bar_);
     const double size = y_bar_.cwiseAbs().maxCoeff();
     if (!std::isfinite(size)) continue;
@@ -169,7 +170,9 @@ bool Adjoint::evaluate(double t, N_Vector y, N_Vector lambda) {
   const StatePoint at = flow.point(t, values(y));
   for (Eigen::Index o = 0; o < objectives_; ++o) {
     w_ = values(lambda).segment(o * states_, states_);
-    y_bar_.setZero(), theta_bar_.setZero(), rho_bar_.setZero();
+    y_bar_.setZero();
+    theta_bar_.setZero();
+    rho_bar_.setZero();
     flow.dynamics().add_adjoint(w_, y_bar_, theta_bar_, rho_bar_);
     if (const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get()) {
       running->add_gradient(at, 1, y_bar_, rho_bar_);

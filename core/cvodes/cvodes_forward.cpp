@@ -65,8 +65,10 @@ Sensitivities::Sensitivities(ForwardRun& run, const SimulationSettings& settings
       rate_(StateLayout{run.flow().data().n}.size(), run.context()) {
   const MechanismData& d = run.flow().data();
   const Eigen::Index states = StateLayout{d.n}.size();
-  direction_.setZero(states, kLanes), change_.setZero(states, kLanes);
-  y_bar_.setZero(states), rho_bar_.setZero(d.rho.size());
+  direction_.setZero(states, kLanes);
+  change_.setZero(states, kLanes);
+  y_bar_.setZero(states);
+  rho_bar_.setZero(d.rho.size());
   y_rho_.setZero(states, d.rho.size());
   psi_rho_.setZero(static_cast<Eigen::Index>(costs.size()), d.rho.size());
   if (count_ > 0 && run.result().ok()) register_with(settings);
@@ -124,7 +126,8 @@ int Sensitivities::g(int count, realtype t, N_Vector y, N_Vector* s, N_Vector, N
     const StatePoint at = self.run_.flow().point(t, values(y));
     for (std::size_t q = 0; q < self.run_.running().size(); ++q) {
       const PointCost& cost = *self.costs_[static_cast<std::size_t>(self.run_.running()[q])].running;
-      self.y_bar_.setZero(), self.rho_bar_.setZero();
+      self.y_bar_.setZero();
+      self.rho_bar_.setZero();
       cost.add_gradient(at, 1, self.y_bar_, self.rho_bar_);
       for (int k = 0; k < count; ++k) {
         const double rate = self.y_bar_.dot(values(s[k])) + self.rho_bar_(self.active_[static_cast<std::size_t>(k)]);
@@ -137,7 +140,8 @@ int Sensitivities::g(int count, realtype t, N_Vector y, N_Vector* s, N_Vector, N
 
 void Sensitivities::add_cost(const PointCost& cost, const StatePoint& at, Eigen::Index objective) {
   if (count_ == 0) return;
-  y_bar_.setZero(), rho_bar_.setZero();
+  y_bar_.setZero();
+  rho_bar_.setZero();
   cost.add_gradient(at, 1, y_bar_, rho_bar_);
   psi_rho_.row(objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
 }

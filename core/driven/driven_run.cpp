@@ -106,7 +106,8 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
     instants_ = timed_instants(mechanism, costs, settings.start_time, settings.end_time, shortest_, events);
   events_ = EventTimes(events, settings.start_time, settings.end_time);
   g_.resize(running_.size() * kNodes);
-  integrals_.resize(running_.size()), errors_.resize(running_.size());
+  integrals_.resize(running_.size());
+  errors_.resize(running_.size());
   path_.start(settings.start_time, settings.end_time, start.result().y, start.result().angles);
   path_.set_watch([&d = mechanism_.data(), differentiated](const DrivenState& from, const DrivenState& to) {
     std::string words = past_half_turn(d, from.y, to.t, to.y);
@@ -215,7 +216,8 @@ double DrivenRun::next_end() {
 // Other steps may pass where the path ended. If it ends there again, so does the panel.
 void DrivenRun::try_shorter(Panel outcome, double t1) {
   const double t = from_.t, reached = path_.state().t;
-  ++result_.statistics.rejected, ++result_.statistics.rejections.error_test;
+  ++result_.statistics.rejected;
+  ++result_.statistics.rejections.error_test;
   path_.start(from_);
   const bool is_stuck = outcome == Panel::stuck;
   const bool ends = is_stuck && std::abs(reached - ended_at_) <= kSameEnd * (settings_.end_time - t);
@@ -259,7 +261,10 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
     double shortest = shortest_;
     for (std::size_t k = 0; k < kNodes; ++k) {
       g[k] = g_[r * kNodes + k];
-      if (is_left_out(g[k], nodes_[k].t)) g[k] = 0, shortest = window_at(nodes_[k].t)->half;
+      if (is_left_out(g[k], nodes_[k].t)) {
+        g[k] = 0;
+        shortest = window_at(nodes_[k].t)->half;
+      }
     }
     integrals_[r] = integrate_panel(g, h);
     if (frozen_ || h <= shortest) continue;
@@ -346,7 +351,10 @@ bool DrivenRun::take_panel(double t1, const Take& take) {
     result_.psi(o) += I.value;
     absolute_(o) += I.absolute;
     errors_[r].of_run += I.error;
-    if (I.error > errors_[r].worst) errors_[r].worst = I.error, errors_[r].worst_t = from_.t;
+    if (I.error > errors_[r].worst) {
+      errors_[r].worst = I.error;
+      errors_[r].worst_t = from_.t;
+    }
   }
   if (!take_events_until(INFINITY, events, take)) return false;
   path_.start(end);
@@ -392,7 +400,8 @@ bool DrivenRun::take_terminal_costs(const Take& take) {
 void DrivenRun::end_panel(double t0, double t1) {
   SimulationStatistics& s = result_.statistics;
   ++s.steps;
-  result_.steps.times.push_back(t0), result_.steps.sizes.push_back(t1 - t0);
+  result_.steps.times.push_back(t0);
+  result_.steps.sizes.push_back(t1 - t0);
   result_.last_good_time = t1;
   double relative = 0;
   s.max_position_violation = std::max(s.max_position_violation, path_.position_violation(&relative));

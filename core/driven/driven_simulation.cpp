@@ -44,7 +44,8 @@ class DrivenDerivatives {
         rho_bar_(Eigen::VectorXd::Zero(data_.rho.size())),
         y0_bar_(y_bar_),
         y_rho_(Eigen::MatrixXd::Zero(mechanism.states(), data_.rho.size())) {
-    y0_dir_.setZero(mechanism.states(), kLanes), direction_ = y0_dir_;
+    y0_dir_.setZero(mechanism.states(), kLanes);
+    direction_ = y0_dir_;
   }
 
   // Sets y_rho at a point. Within a singular window it is the sum over its nodes that the state is. Returns false if J
@@ -84,7 +85,8 @@ class DrivenDerivatives {
   const Eigen::MatrixXd& y_rho() const { return y_rho_; }
   // psi_rho += weight d(cost)/d(rho) with y_rho known
   void add_forward(const DrivenTerm& term, const StatePoint& at, Eigen::MatrixXd& psi_rho) {
-    y_bar_.setZero(), rho_bar_.setZero();
+    y_bar_.setZero();
+    rho_bar_.setZero();
     term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
     psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
   }

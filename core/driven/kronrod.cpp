@@ -17,7 +17,8 @@ const KronrodRule& kronrod_rule() {
     for (std::size_t k = 0; k <= middle; ++k) {
       const double x = Kronrod::abscissa()[k] / 2, w = Kronrod::weights()[k] / 2;
       const double g = k % 2 == 0 ? Gauss::weights()[k / 2] / 2 : 0.0;
-      r.nodes[middle - k] = 0.5 - x, r.nodes[middle + k] = 0.5 + x;
+      r.nodes[middle - k] = 0.5 - x;
+      r.nodes[middle + k] = 0.5 + x;
       r.kronrod[middle - k] = r.kronrod[middle + k] = w;
       r.gauss[middle - k] = r.gauss[middle + k] = g;
     }
@@ -31,7 +32,9 @@ PanelIntegral integrate_panel(std::span<const double> g, double h) {
   const KronrodRule& rule = kronrod_rule();
   double K = 0, G = 0, absolute = 0, deviation = 0;
   for (std::size_t k = 0; k < kNodes; ++k) {
-    K += rule.kronrod[k] * g[k], G += rule.gauss[k] * g[k], absolute += rule.kronrod[k] * std::abs(g[k]);
+    K += rule.kronrod[k] * g[k];
+    G += rule.gauss[k] * g[k];
+    absolute += rule.kronrod[k] * std::abs(g[k]);
   }
   for (std::size_t k = 0; k < kNodes; ++k) deviation += rule.kronrod[k] * std::abs(g[k] - K);
   const double difference = std::abs(K - G);

@@ -26,11 +26,15 @@ void add_chords(const KinkedSignal& signal, std::vector<double>& instants) {
     double distance = kChord * (*high - *low);
     for (std::size_t k = i + 1; k < j; ++k) {
       const double d = std::abs(y[k] - y[i] - (y[j] - y[i]) * (x[k] - x[i]) / (x[j] - x[i]));
-      if (d > distance) farthest = k, distance = d;
+      if (d > distance) {
+        farthest = k;
+        distance = d;
+      }
     }
     if (farthest == i) continue;
     instants.push_back(x[farthest] + signal.delay);
-    chords.push_back({i, farthest}), chords.push_back({farthest, j});
+    chords.push_back({i, farthest});
+    chords.push_back({farthest, j});
   }
 }
 

@@ -14,10 +14,15 @@ void add_lower_square(double alpha, const double* x, int first, int last, Mat<6,
   const double a3 = alpha * x[3], a4 = alpha * x[4], a5 = alpha * x[5];
   for (int j = first; j < last; ++j) {
     for (int i = j; i < last; ++i) S(i, j) += alpha * x[i] * x[j];
-    S(3, j) += a3 * x[j], S(4, j) += a4 * x[j], S(5, j) += a5 * x[j];
+    S(3, j) += a3 * x[j];
+    S(4, j) += a4 * x[j];
+    S(5, j) += a5 * x[j];
   }
-  S(3, 3) += a3 * x[3], S(4, 3) += a4 * x[3], S(5, 3) += a5 * x[3];
-  S(4, 4) += a4 * x[4], S(5, 4) += a5 * x[4];
+  S(3, 3) += a3 * x[3];
+  S(4, 3) += a4 * x[3];
+  S(5, 3) += a5 * x[3];
+  S(4, 4) += a4 * x[4];
+  S(5, 4) += a5 * x[4];
   S(5, 5) += a5 * x[5];
 }
 
@@ -101,7 +106,8 @@ void ConstraintRows::evaluate(std::size_t group, const Frames& frames, Eigen::Ve
             J.middleRows<m>(c->block).template leftCols<3>() = c->factor * from.template leftCols<3>();
             J.middleRows<m>(c->block).template rightCols<3>() = c->factor * from.template rightCols<3>();
           };
-          copy(A, J1), copy(B, J2);
+          copy(A, J1);
+          copy(B, J2);
         },
         c->primitive);
   }

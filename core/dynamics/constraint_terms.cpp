@@ -58,7 +58,8 @@ void add_tangent(const Constraint& c, const std::vector<Frame>& frames, const Ro
         Lanes<1> storage;
         if (const Lanes<1>* factor_dir = block.field<1>(c.slot_factor, storage)) {
           Vec<m> phi, phi_dot, phi_ddot;
-          p.phi(frames[i], frames[j], phi), p.phi_dot(frames[i], frames[j], phi_dot);
+          p.phi(frames[i], frames[j], phi);
+          p.phi_dot(frames[i], frames[j], phi_dot);
           p.phi_ddot(frames[i], frames[j], phi_ddot);
           put_on_branch<P>(c, laws, angles, phi);
           out.phi.middleRows<m>(c.row) += phi * *factor_dir;
@@ -117,7 +118,9 @@ void ConstraintTerms::add_pull_back(const Frames& frames, RowLaws& laws, const E
             const Multipliers<m> unscaled{rows<m>(weights.lambda, c.row, scale), rows<m>(weights.mu0, c.row, scale),
                                           rows<m>(weights.mu1, c.row, scale), rows<m>(weights.mu2, c.row, scale)};
             Vec<m> phi, phi_dot, phi_ddot;
-            p.phi(f1, f2, phi), p.phi_dot(f1, f2, phi_dot), p.phi_ddot(f1, f2, phi_ddot);
+            p.phi(f1, f2, phi);
+            p.phi_dot(f1, f2, phi_dot);
+            p.phi_ddot(f1, f2, phi_ddot);
             put_on_branch<P>(c, laws, angles, phi);
             theta_bar(c.slot_factor) += unscaled.lambda.dot(virtual_change(p, f1, f2)) + unscaled.mu0.dot(phi) +
                                         unscaled.mu1.dot(phi_dot) + unscaled.mu2.dot(phi_ddot);

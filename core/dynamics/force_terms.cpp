@@ -128,7 +128,8 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
     f.tangent(c, Lanes<3>::Zero(), frame, units[index(f.body)].p, nullptr, load);
     out.b[index(out.pair(f.body, f.body))].add(MotionBlocks::p, load);
     for (const int s : f.sensors) {
-      y_bar_.setZero(), rho_bar_.setZero();
+      y_bar_.setZero();
+      rho_bar_.setZero();
       add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
       Lanes<3> dc = Lanes<3>::Zero();
       for (int i = 0; i < 3; ++i) dc(i, 0) = gradients_[index(i)][index(t + 1 + s)];
@@ -158,7 +159,8 @@ void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, st
     Lanes<3> dc = Lanes<3>::Zero();
     for (const int k : f.parameters) add_input(k, block.direction(k), dc);
     for (const int s : f.sensors) {
-      y_bar_.setZero(), rho_bar_.setZero();
+      y_bar_.setZero();
+      rho_bar_.setZero();
       add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
       Lanes<1> direction = Lanes<1>::Zero();
       for (int lane = 0; lane < kLanes; ++lane) {

@@ -53,8 +53,14 @@ int MotionBlocks::find(const std::vector<Place>& places, const std::vector<int>&
 }
 
 void MotionBlocks::set_zero() {
-  for (Block<6>& x : b) x.q.setZero(), x.v.setZero();
-  for (Block<1>& x : c) x.q.setZero(), x.v.setZero();
+  for (Block<6>& x : b) {
+    x.q.setZero();
+    x.v.setZero();
+  }
+  for (Block<1>& x : c) {
+    x.q.setZero();
+    x.v.setZero();
+  }
 }
 
 void MotionBlocks::add_times(const LaneRows& y_dir, std::vector<Lanes<6>>& b_dir, LaneRows& c_dir) const {

@@ -20,8 +20,11 @@ MotionJacobian::MotionJacobian(const MechanismData& data) : n_(data.n), m_(data.
 
 MotionJacobian::Values MotionJacobian::values() const {
   Values x;
-  x.q.assign(pairs_.size(), Block::Zero()), x.v = x.q;
-  x.row_q.assign(rows_.size(), Row::Zero()), x.row_v = x.row_q, x.J_Z = x.row_q;
+  x.q.assign(pairs_.size(), Block::Zero());
+  x.v = x.q;
+  x.row_q.assign(rows_.size(), Row::Zero());
+  x.row_v = x.row_q;
+  x.J_Z = x.row_q;
   x.J.assign(rows_.size(), Mat<1, 6>::Zero());
   x.mass.assign(at(n_), Block::Zero());
   return x;

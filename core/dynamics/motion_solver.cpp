@@ -36,7 +36,9 @@ void MotionSolver::fold_bar(const StatePoint& at, Eigen::Ref<Eigen::VectorXd> y_
                             Eigen::Ref<Eigen::VectorXd> rho_bar) {
   motion(at);
   dynamics_.linearise_here();
-  y_bar_.setZero(), theta_bar_.setZero(), rho_bar_.setZero();
+  y_bar_.setZero();
+  theta_bar_.setZero();
+  rho_bar_.setZero();
   dynamics_.add_adjoint(w_, y_bar_, theta_bar_, rho_bar_, &bar_);
   y_bar += y_bar_;
   rho_bar += rho_bar_;

@@ -22,8 +22,14 @@ MotionTerms::MotionTerms(const MechanismData& data, const FormulationSettings& s
       forces_(data),
       user_(data) {
   const std::size_t n = static_cast<std::size_t>(data.n);
-  bodies.resize(n + 1), frames.resize(n + 1), body_loads_.resize(n + 1), load_dirs_.resize(n + 1), bars_.resize(n + 1);
-  f.resize(n), z.resize(n), b_dir.resize(n);
+  bodies.resize(n + 1);
+  frames.resize(n + 1);
+  body_loads_.resize(n + 1);
+  load_dirs_.resize(n + 1);
+  bars_.resize(n + 1);
+  f.resize(n);
+  z.resize(n);
+  b_dir.resize(n);
   y_.setZero(StateLayout{data.n}.size());
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
   for (Eigen::VectorXd* x : {&lambda, &phi_, &phi_dot_}) x->setZero(data.m);
@@ -206,7 +212,8 @@ void MotionTerms::add_pull_back(const std::vector<Vec<6>>& eta, const Eigen::Vec
   if (omega2_ != 0) {
     phi_dot_ = two_xi_omega_ * mu;
     phi_ = omega2_ * mu;
-    weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
+    weights.mu0 = &phi_;
+    weights.mu1 = &phi_dot_;
   }
   constraints_.add_pull_back(frames, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
   forces_.add_pull_back(here(), bars_, y_bar, theta_bar, rho_bar);

@@ -32,7 +32,8 @@ class PlanarBodies {
 
   template <class Y>
   void add_vector(const Plane& x, Eigen::Index first, Y&& y) const {
-    y(first + model_->t1) += x.re, y(first + model_->t2) += x.im;
+    y(first + model_->t1) += x.re;
+    y(first + model_->t2) += x.im;
   }
   template <class Y>
   void add_turn(std::size_t body, const Plane& P, Eigen::Index first, Y&& y) const {
@@ -40,7 +41,8 @@ class PlanarBodies {
     y.template segment<4>(first) += P.re * b.p_a + P.im * b.p_b;
   }
   void set_vector_direction(const Lanes<3>& x, Eigen::Index first, LaneRows& y_dir) const {
-    y_dir.row(first + model_->t1) = x.row(0), y_dir.row(first + model_->t2) = x.row(1);
+    y_dir.row(first + model_->t1) = x.row(0);
+    y_dir.row(first + model_->t2) = x.row(1);
   }
   void add_turn_direction(std::size_t body, const PlaneDual& P, Eigen::Index first, LaneRows& y_dir) const {
     const PlanarBody& b = model_->bodies[body];

@@ -194,7 +194,8 @@ void PlanarConstraints::evaluate(const Frames& frames, Branch&& branch, Eigen::V
     const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
     if (c.kind == Kind::point) {
       const Plane d = of(order, separation(f1, f2, vectors(c)));
-      out(c.row) = d.re, out(c.row2) = d.im;
+      out(c.row) = d.re;
+      out(c.row2) = d.im;
     } else {
       out(c.row) += c.factor * branch(c, phi_of(order, c, f1, f2, vectors(c)));
     }
@@ -248,7 +249,9 @@ void PlanarConstraints::add_pull_back(const Frames& frames, RowLaws& laws, const
     const auto keep = [&](int slot, std::size_t body, const Plane& bar) {
       if (slot >= 0) theta_bar.segment<3>(slot) += model_->bodies[body].in_body(bar);
     };
-    keep(c.slot1, i, s_bar.s1), keep(c.slot2, j, s_bar.s2), keep(c.slot3, i, s_bar.s3);
+    keep(c.slot1, i, s_bar.s1);
+    keep(c.slot2, j, s_bar.s2);
+    keep(c.slot3, i, s_bar.s3);
   }
   laws.add_pull_back(weights.mu0, weights.mu1, weights.mu2, scale, theta_bar, rho_bar);
 }
@@ -306,7 +309,8 @@ void PlanarConstraints::field_tangents(const Frames& frames, RowLaws& laws, cons
   phi.setZero();
   const auto at_rest = [](const PlanarFrame<double>& f) {
     PlanarFrame<Dual> out;
-    out.r = {f.r.re, f.r.im}, out.A = {f.A.re, f.A.im};
+    out.r = {f.r.re, f.r.im};
+    out.A = {f.A.re, f.A.im};
     return out;
   };
   for (const PlanarConstraint& c : model_->constraints) {
@@ -352,11 +356,13 @@ void PlanarConstraints::subtract_point_tangents(const Frames& frames, const std:
     LaneRow &first = rows[p.row], &second = rows[p.row2];
     if (p.body2 > 0) {
       const LaneRow* x = entries(Addot_dirs[at(p.body2)]);
-      first -= p.s2.re * x[0] - p.s2.im * x[1], second -= p.s2.re * x[1] + p.s2.im * x[0];
+      first -= p.s2.re * x[0] - p.s2.im * x[1];
+      second -= p.s2.re * x[1] + p.s2.im * x[0];
     }
     if (p.body1 > 0) {
       const LaneRow* x = entries(Addot_dirs[at(p.body1)]);
-      first += p.s1.re * x[0] - p.s1.im * x[1], second += p.s1.re * x[1] + p.s1.im * x[0];
+      first += p.s1.re * x[0] - p.s1.im * x[1];
+      second += p.s1.re * x[1] + p.s1.im * x[0];
     }
     const auto vector_moves = [&](int slot, int body, double sign) {
       if (!block.moves(slot, 3)) return;

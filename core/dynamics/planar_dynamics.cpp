@@ -53,8 +53,12 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   const std::size_t n = at(data.n);
   y_.setZero(StateLayout{data.n}.size());
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
-  bodies_.resize(n + 1), frames_.resize(n + 1), dual_frames_.resize(n + 1);
-  loads_.resize(n), z_.resize(n), eta_.resize(n);
+  bodies_.resize(n + 1);
+  frames_.resize(n + 1);
+  dual_frames_.resize(n + 1);
+  loads_.resize(n);
+  z_.resize(n);
+  eta_.resize(n);
   const Eigen::Index m = InPlane::rows(data);
   for (Eigen::VectorXd* x : {&gamma_, &phi_, &phi_dot_, &lambda_, &mu_, &g_}) x->setZero(m);
   lambda_of_phi_.setZero(data.m);
@@ -62,8 +66,13 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
        {&constraint_dirs_.phi, &constraint_dirs_.phi_dot, &constraint_dirs_.phi_ddot, &gamma_dir_, &lambda_dir_}) {
     x->setZero(m, kLanes);
   }
-  load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
-  turns_.resize(n + 1), turn_dirs_.resize(n + 1), Addot_dirs_.resize(n + 1), moments_.resize(n + 1);
+  load_dirs_.resize(n + 1);
+  rhs_lanes_.resize(n);
+  z_dir_.resize(n);
+  turns_.resize(n + 1);
+  turn_dirs_.resize(n + 1);
+  Addot_dirs_.resize(n + 1);
+  moments_.resize(n + 1);
   bars_.resize(n + 1);
   std::vector<bool> dual(n + 1, formulation.omega != 0);
   constraints_.mark_others(dual);
@@ -80,8 +89,11 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   for (std::size_t i = 1; i <= n; ++i) {
     if (loaded[i]) loaded_.push_back(i);
   }
-  states_in_space_.resize(n + 1), frames_in_space_.resize(n + 1), body_loads_.resize(n + 1);
-  body_load_dirs_.resize(n + 1), bars_in_space_.resize(n + 1);
+  states_in_space_.resize(n + 1);
+  frames_in_space_.resize(n + 1);
+  body_loads_.resize(n + 1);
+  body_load_dirs_.resize(n + 1);
+  bars_in_space_.resize(n + 1);
 }
 
 void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
@@ -92,8 +104,11 @@ void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::
   for (std::size_t k = 1; k < bodies_.size(); ++k) {
     Body& b = bodies_[k];
     PlanarFrame<double>& f = frames_[k];
-    f.r = bodies_in_y_.vector(y, layout.q(k)), f.rdot = bodies_in_y_.vector(y, layout.v(k)), f.rddot = {};
-    b.P = bodies_in_y_.turn(k, y, layout.p(k)), b.Pdot = bodies_in_y_.turn(k, y, layout.pdot(k));
+    f.r = bodies_in_y_.vector(y, layout.q(k));
+    f.rdot = bodies_in_y_.vector(y, layout.v(k));
+    f.rddot = {};
+    b.P = bodies_in_y_.turn(k, y, layout.p(k));
+    b.Pdot = bodies_in_y_.turn(k, y, layout.pdot(k));
     f.set_turn(b.P, b.Pdot, 0);
   }
   angles_ = angles;
@@ -209,7 +224,8 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
   if (formulation_.omega != 0) {
     phi_dot_ = 2 * formulation_.xi * formulation_.omega * mu_;
     phi_ = formulation_.omega * formulation_.omega * mu_;
-    weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
+    weights.mu0 = &phi_;
+    weights.mu1 = &phi_dot_;
   }
   constraints_.add_pull_back(frames_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
   if (springs_in_plane_) {

@@ -75,7 +75,10 @@ void PlanarDynamics::prepare_force_tangents() {
     };
     const Mat<3, 7> q = in_plane(block.q);
     ForceLinearisation::Block& to = x.in_plane[k];
-    to.q += reduce(q), to.v += reduce(in_plane(block.v)), to.height += q.col(model_.n), to.filled = true;
+    to.q += reduce(q);
+    to.v += reduce(in_plane(block.v));
+    to.height += q.col(model_.n);
+    to.filled = true;
   }
 }
 
@@ -189,7 +192,8 @@ void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const Lan
       Addot[i] = x.Addot(i, 0) * P[0] + x.Addot(i, 1) * P[1] + x.Addot(i, 2) * P[2] + x.Addot(i, 3) * P[3];
     }
     LaneRow* b = entries(rhs_lanes_[k - 1]);
-    b[0] = LaneRow{}, b[1] = LaneRow{};
+    b[0] = LaneRow{};
+    b[1] = LaneRow{};
     b[2] = x.moment.re * P[1] - x.moment.im * P[0];
   }
   gamma_dir_.setZero();
@@ -200,7 +204,8 @@ void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const Lan
   const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
   for (std::size_t i = 0; dg && i < rhs_lanes_.size(); ++i) {
     const double mass = model_.bodies[i + 1].mass;
-    rhs_lanes_[i].row(0) += mass * dg->row(model_.t1), rhs_lanes_[i].row(1) += mass * dg->row(model_.t2);
+    rhs_lanes_[i].row(0) += mass * dg->row(model_.t1);
+    rhs_lanes_[i].row(1) += mass * dg->row(model_.t2);
   }
   for (const std::size_t k : bodies_with_slots_) {
     InPlane::subtract_mass_tangent(data_, k, block, z_against_gravity(k), rhs_lanes_[k - 1]);
@@ -215,12 +220,14 @@ void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const Lan
     const Plane& turn = bodies_[k].P;
     const LaneRow *P = entries(turn_dirs_[k]), *z = entries(z_dir_[k - 1]);
     for (int i = 0; i < 3; ++i) out[i] = LaneRow{};
-    out[model_.t1] = z[0], out[model_.t2] = z[1];
+    out[model_.t1] = z[0];
+    out[model_.t2] = z[1];
     LaneRow Pddot[2];
     for (int i = 0; i < 2; ++i) {
       Pddot[i] = x.Pddot(i, 0) * P[0] + x.Pddot(i, 1) * P[1] + x.Pddot(i, 2) * P[2] + x.Pddot(i, 3) * P[3];
     }
-    Pddot[0] -= (0.5 * turn.im) * z[2], Pddot[1] += (0.5 * turn.re) * z[2];
+    Pddot[0] -= (0.5 * turn.im) * z[2];
+    Pddot[1] += (0.5 * turn.re) * z[2];
     for (int i = 0; i < 4; ++i) out[3 + i] = body.p_a(i) * Pddot[0] + body.p_b(i) * Pddot[1];
   }
 }

@@ -51,7 +51,10 @@ void PlanarRows::evaluate(const Frames& frames) {
     Point& p = points_[k];
     const PlanarConstraint& c = model_->constraints[at(point_places_[k].constraint)];
     const Plane x1 = frames[at(p.body1)].A * c.s1, x2 = frames[at(p.body2)].A * c.s2;
-    p.x1[0] = x1.re, p.x1[1] = x1.im, p.x2[0] = x2.re, p.x2[1] = x2.im;
+    p.x1[0] = x1.re;
+    p.x1[1] = x1.im;
+    p.x2[0] = x2.re;
+    p.x2[1] = x2.im;
   }
   for (Entry& e : entries_) e.J[0] = e.J[1] = e.J[2] = 0;
   for (const Single& s : singles_) {
@@ -60,7 +63,9 @@ void PlanarRows::evaluate(const Frames& frames) {
     const auto add = [&](int entry, const Plane& force, double moment) {
       if (entry < 0) return;
       double* J = entries_[at(entry)].J;
-      J[0] += c.factor * force.re, J[1] += c.factor * force.im, J[2] += c.factor * moment;
+      J[0] += c.factor * force.re;
+      J[1] += c.factor * force.im;
+      J[2] += c.factor * moment;
     };
     add(s.entry1, column.force1, column.moment1);
     add(s.entry2, column.force2, column.moment2);
@@ -72,10 +77,15 @@ Eigen::MatrixXd PlanarRows::dense() const {
   const auto add_point = [&](const Point& p, int body, double sign, const double* x) {  // sign (I, i x)
     if (body == 0) return;
     const Eigen::Index first = 3 * (body - 1);
-    J(p.row, first) += sign, J(p.row2, first + 1) += sign;
-    J(p.row, first + 2) -= sign * x[1], J(p.row2, first + 2) += sign * x[0];
+    J(p.row, first) += sign;
+    J(p.row2, first + 1) += sign;
+    J(p.row, first + 2) -= sign * x[1];
+    J(p.row2, first + 2) += sign * x[0];
   };
-  for (const Point& p : points_) add_point(p, p.body1, -1, p.x1), add_point(p, p.body2, 1, p.x2);
+  for (const Point& p : points_) {
+    add_point(p, p.body1, -1, p.x1);
+    add_point(p, p.body2, 1, p.x2);
+  }
   for (const Entry& e : entries_)
     for (int k = 0; k < 3; ++k) J(e.row, 3 * (e.body - 1) + k) += e.J[k];
   return J;
@@ -104,8 +114,10 @@ void PlanarRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky
     const auto add_square = [&](int body, const double* x) {
       if (body == 0) return;
       Mat<3, 3>& D = S.diagonal(body - 1);  // its lower triangle is what is read
-      D(0, 0) += a, D(1, 1) += b;
-      D(2, 0) -= a * x[1], D(2, 1) += b * x[0];
+      D(0, 0) += a;
+      D(1, 1) += b;
+      D(2, 0) -= a * x[1];
+      D(2, 1) += b * x[0];
       D(2, 2) += a * x[1] * x[1] + b * x[0] * x[0];
     };
     add_square(p.body1, p.x1);

@@ -32,7 +32,9 @@ class PlanarRows : public RowProducts<PlanarRows, RowsInPlane> {
     X out;
     const auto* from = entries(x);
     auto* to = entries(out);
-    to[0] = b.mass * from[0], to[1] = b.mass * from[1], to[2] = b.inertia * from[2];
+    to[0] = b.mass * from[0];
+    to[1] = b.mass * from[1];
+    to[2] = b.inertia * from[2];
     return out;
   }
   Eigen::MatrixXd dense() const;  // J, 3 columns per moving body

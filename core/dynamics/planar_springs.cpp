@@ -40,7 +40,9 @@ void PlanarSprings::add_loads(double t, const std::vector<PlanarFrame<double>>& 
     const auto add = [&](std::size_t body, const Plane& at, const Plane& force) {
       if (body == 0) return;
       Vec<3>& load = loads[body - 1];
-      load(0) += force.re, load(1) += force.im, load(2) += cross(frames[body].A * at, force);
+      load(0) += force.re;
+      load(1) += force.im;
+      load(2) += cross(frames[body].A * at, force);
     };
     add(s.body1, s.s1, F);
     add(s.body2, s.s2, -F);

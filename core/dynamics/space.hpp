@@ -74,7 +74,10 @@ struct InPlane {
     Lanes<1> m_dir;
     Lanes<6> J_dir;
     const BodyData& of = data.bodies[body];
-    if (const auto* dm = block.field<1>(of.slot_mass, m_dir)) b.row(0) -= x(0) * *dm, b.row(1) -= x(1) * *dm;
+    if (const auto* dm = block.field<1>(of.slot_mass, m_dir)) {
+      b.row(0) -= x(0) * *dm;
+      b.row(1) -= x(1) * *dm;
+    }
     if (const auto* dJ = block.field<6>(of.slot_J, J_dir)) {
       b.row(2) -= x(2) * (PlanarBodies(*data.planar).inertia_weights(body).transpose() * *dJ);
     }

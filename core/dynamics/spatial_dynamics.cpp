@@ -13,7 +13,10 @@ SpatialDynamics::SpatialDynamics(const Mechanism& mechanism, const FormulationSe
       terms_(data_, settings),
       solver_(data_, settings_.alpha, settings_.compliance, terms_.user_masses()) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
-  loads_bar_.resize(n), eta_.resize(n), z_dir_.resize(n), pddot_bar_.resize(n + 1);
+  loads_bar_.resize(n);
+  eta_.resize(n);
+  z_dir_.resize(n);
+  pddot_bar_.resize(n + 1);
   for (Eigen::VectorXd* x : {&gamma_, &mu_, &g_}) x->setZero(data_.m);
   lambda_dir_.setZero(data_.m, kLanes);
 }

@@ -16,8 +16,11 @@ Lanes<1> dot(const Vector4d& a, const Lanes<4>& b) {
 StageEquations::StageEquations(SpatialDynamics& dynamics)
     : dynamics_(dynamics), terms_(dynamics.terms()), data_(dynamics.data()) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
-  a_.setZero(StateLayout{data_.n}.positions()), mu_.setZero(data_.m);
-  z_bar_.resize(n), eta_.resize(n), z_dir_.resize(n);
+  a_.setZero(StateLayout{data_.n}.positions());
+  mu_.setZero(data_.m);
+  z_bar_.resize(n);
+  eta_.resize(n);
+  z_dir_.resize(n);
   no_pddot_bar_.assign(n + 1, Vector4d::Zero());
 }
 

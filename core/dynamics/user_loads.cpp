@@ -18,12 +18,18 @@ UserLoads::UserLoads(const MechanismData& data) : data_(data) {
   Eigen::Index largest = 0;
   for (const UserForceData& f : data_.user_forces) largest = std::max(largest, size_of(f));
   for (Eigen::VectorXd* x : {&q_, &v_, &Q_, &e_}) x->setZero(largest);
-  K_.setZero(largest, largest), C_.setZero(largest, largest), Q_rho_.setZero(largest, data_.rho.size());
+  K_.setZero(largest, largest);
+  C_.setZero(largest, largest);
+  Q_rho_.setZero(largest, data_.rho.size());
   for (const UserForceData& f : data_.user_forces) {
     if (f.force->inertia()) masses_.push_back({f.bodies.front(), Mat<6, 6>::Zero()});
   }
   if (masses_.empty()) return;
-  z_.setZero(6), L_.setZero(6), M_.setZero(6, 6), L_y_.setZero(6, 14), L_rho_.setZero(6, data_.rho.size());
+  z_.setZero(6);
+  L_.setZero(6);
+  M_.setZero(6, 6);
+  L_y_.setZero(6, 14);
+  L_rho_.setZero(6, data_.rho.size());
 }
 
 void UserLoads::set_masses(const Eigen::VectorXd& y) {

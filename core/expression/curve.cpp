@@ -11,7 +11,8 @@ Curve::Curve(Interpolation how, std::vector<double> x, std::vector<double> y) : 
     spline_.emplace(std::move(x), std::move(y));
     return;
   }
-  x_ = std::move(x), y_ = std::move(y);
+  x_ = std::move(x);
+  y_ = std::move(y);
   if (x_.size() < 2 || y_.size() != x_.size()) throw std::invalid_argument("a curve needs two or more samples");
   for (std::size_t i = 1; i < x_.size(); ++i)
     if (!(x_[i] > x_[i - 1])) throw std::invalid_argument("a curve's abscissae must increase");

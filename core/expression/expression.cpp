@@ -51,7 +51,8 @@ struct ExpressionMaker {
     SyntaxTree tree;
     SyntaxNode node;
     node.operation = operation;
-    node.a = append(tree, a), node.b = append(tree, b);
+    node.a = append(tree, a);
+    node.b = append(tree, b);
     tree.nodes.push_back(std::move(node));
     tree.text = "(" + a.text() + ") " + sign + " (" + b.text() + ")";
     return of(std::move(tree));

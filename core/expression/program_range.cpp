@@ -15,7 +15,8 @@ bool holds(const Range& r, double x) { return r.low <= x && x <= r.high; }
 
 void widen(Range& r, double x) {
   if (std::isnan(x)) r = kAll;
-  r.low = std::min(r.low, x), r.high = std::max(r.high, x);
+  r.low = std::min(r.low, x);
+  r.high = std::max(r.high, x);
 }
 
 // sin takes its peaks at pi/2 + k pi, with the sign of cos(k pi).
@@ -66,7 +67,8 @@ Range range_of(const Program::CurveUse& use, const Range& a) {
   const auto& [f, order] = use;
   const Curve& curve = *f;
   Range r{kInfinity, -kInfinity};
-  widen(r, curve.at(a.low, order)), widen(r, curve.at(a.high, order));
+  widen(r, curve.at(a.low, order));
+  widen(r, curve.at(a.high, order));
   if (curve.is_routine()) return r;
   const auto last = std::upper_bound(curve.x().begin(), curve.x().end(), a.high);
   for (auto x = std::lower_bound(curve.x().begin(), last, a.low); x != last; ++x) widen(r, curve.at(*x, order));

@@ -47,7 +47,8 @@ std::vector<Program> switches_of(const Program& program) {
         break;
       }
       case Operation::atan2:
-        jump(Operation::name, in.a), jump(Operation::name, in.b);
+        jump(Operation::name, in.a);
+        jump(Operation::name, in.b);
         break;
       case Operation::tan:
         jump(Operation::cos, in.a);

@@ -134,7 +134,8 @@ std::vector<double> pieces_along(const Program& part, const std::vector<double>&
       instants.push_back(t1);
     } else {
       const double middle = 0.5 * (t0 + t1);
-      pieces.push_back({t0, middle, false}), pieces.push_back({middle, t1, false});
+      pieces.push_back({t0, middle, false});
+      pieces.push_back({middle, t1, false});
     }
   }
   std::sort(instants.begin(), instants.end());
@@ -145,7 +146,8 @@ std::vector<double> pieces_along(const Program& part, const std::vector<double>&
 
 std::vector<double> pieces_of(const Program& part, int time, std::vector<double> x, double start, double end) {
   std::vector<double> rates(x.size(), 0.0);
-  x[static_cast<std::size_t>(time)] = 0, rates[static_cast<std::size_t>(time)] = 1;
+  x[static_cast<std::size_t>(time)] = 0;
+  rates[static_cast<std::size_t>(time)] = 1;
   return pieces_along(part, x, rates, start, end);
 }
 
@@ -175,7 +177,8 @@ std::vector<double> jumps_of(const Program& part, int time, std::vector<double> 
     for (double t = std::midpoint(t0, t1); t > t0 && t < t1; t = std::midpoint(t0, t1)) {
       const double f = value(t);
       if (std::abs(f - f0) < std::abs(f1 - f)) {
-        t0 = t, f0 = f;
+        t0 = t;
+        f0 = f;
       } else {
         t1 = t;
         if (std::isnan(f)) break;  // abs(x)/x has no value at its jump

@@ -179,10 +179,15 @@ Bushing::Coordinates Bushing::coordinates(const Frame& f1, const Frame& f2) cons
   x.Mdot = f1.Adot.transpose() * f2.A + f1.A.transpose() * f2.Adot;
   x.M_eta = f1.A_eta.transpose() * f2.A + f1.A.transpose() * f2.A_eta;
   const Matrix3d R = x.M * R0.transpose(), Rdot = x.Mdot * R0.transpose(), R_eta = x.M_eta * R0.transpose();
-  x.a = 0.5 * twice_vee<double>(R), x.a_dot = 0.5 * twice_vee<double>(Rdot), x.a_eta = 0.5 * twice_vee<double>(R_eta);
+  x.a = 0.5 * twice_vee<double>(R);
+  x.a_dot = 0.5 * twice_vee<double>(Rdot);
+  x.a_eta = 0.5 * twice_vee<double>(R_eta);
   const RotationFactor factor = rotation_factor(0.5 * (R.trace() - 1));
-  x.g = factor.g, x.g1 = factor.g1, x.g2 = factor.g2;
-  x.c_dot = 0.5 * Rdot.trace(), x.c_eta = 0.5 * R_eta.trace();
+  x.g = factor.g;
+  x.g1 = factor.g1;
+  x.g2 = factor.g2;
+  x.c_dot = 0.5 * Rdot.trace();
+  x.c_eta = 0.5 * R_eta.trace();
   x.theta = x.g * x.a;
   x.thetadot = x.g1 * x.c_dot * x.a + x.g * x.a_dot;
   x.theta_eta = x.g1 * x.c_eta * x.a + x.g * x.a_eta;
@@ -226,9 +231,11 @@ void Bushing::pull_back(const ForceInputs&, const Frame& f1, const Frame& f2, Fr
                         Eigen::VectorXd& theta_bar, Eigen::VectorXd&) const {
   const Coordinates x = coordinates(f1, f2);
   CoordinateBars bars;
-  bars.d = -K.cwiseProduct(x.d_eta), bars.ddot = -C.cwiseProduct(x.d_eta);
+  bars.d = -K.cwiseProduct(x.d_eta);
+  bars.ddot = -C.cwiseProduct(x.d_eta);
   bars.d_eta = -(K.cwiseProduct(x.d) + C.cwiseProduct(x.ddot));
-  bars.theta = -Kt.cwiseProduct(x.theta_eta), bars.thetadot = -Ct.cwiseProduct(x.theta_eta);
+  bars.theta = -Kt.cwiseProduct(x.theta_eta);
+  bars.thetadot = -Ct.cwiseProduct(x.theta_eta);
   bars.theta_eta = -(Kt.cwiseProduct(x.theta) + Ct.cwiseProduct(x.thetadot));
   SlotBars slots;
   spread(x, bars, f1, f2, bar1, bar2, slots);
@@ -252,7 +259,8 @@ void Bushing::pull_back_potential(const Eigen::VectorXd&, const Frame& f1, const
                                   FrameBar& bar2, FieldGradient& fields) const {
   const Coordinates x = coordinates(f1, f2);
   CoordinateBars bars;
-  bars.d = K.cwiseProduct(x.d), bars.theta = Kt.cwiseProduct(x.theta);
+  bars.d = K.cwiseProduct(x.d);
+  bars.theta = Kt.cwiseProduct(x.theta);
   SlotBars slots;
   spread(x, bars, f1, f2, bar1, bar2, slots);
   Vec<12> law = Vec<12>::Zero();

@@ -9,7 +9,8 @@ template <class P, class L>
 void JointEffort<P, L>::pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar,
                                            FrameBar& bar1, FrameBar& bar2, FieldGradient& fields) const {
   Multipliers<1> z = Multipliers<1>::zero();
-  z.mu0(0) = x_bar, z.mu1(0) = xdot_bar;
+  z.mu0(0) = x_bar;
+  z.mu1(0) = xdot_bar;
   GeometryBar s;
   joint.measure.pull_back(f1, f2, z, bar1, bar2, s);
   fields.add<3>(joint.slot1, s.s1);
@@ -36,7 +37,9 @@ void JointEffort<P, L>::pull_back(const ForceInputs& in, const Frame& f1, const 
   const Law::Value f = law.derivatives(in.t, in.rho, x, xdot, in.scratch);
   law.add_field_gradient(x, xdot, -change, in.scratch, theta_bar, rho_bar);
   Multipliers<1> z = Multipliers<1>::zero();
-  z.lambda(0) = -f.f, z.mu0(0) = -change * f.f_x, z.mu1(0) = -change * f.f_xdot;
+  z.lambda(0) = -f.f;
+  z.mu0(0) = -change * f.f_x;
+  z.mu1(0) = -change * f.f_xdot;
   GeometryBar s;
   joint.measure.pull_back(f1, f2, z, bar1, bar2, s);
   if (joint.slot1 >= 0) theta_bar.segment<3>(joint.slot1) += s.s1;

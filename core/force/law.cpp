@@ -39,7 +39,9 @@ void Law::add_field_gradient(double x, double xdot, double f_bar, const Scratch&
 void Law::set_inputs(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const {
   std::copy(rho.data(), rho.data() + rho.size(), s.inputs.begin());
   const std::size_t P = static_cast<std::size_t>(rho.size());
-  s.inputs[P] = x, s.inputs[P + 1] = xdot, s.inputs[P + 2] = t;
+  s.inputs[P] = x;
+  s.inputs[P + 1] = xdot;
+  s.inputs[P + 2] = t;
 }
 
 }  // namespace mbsopt

@@ -72,7 +72,8 @@ void TsdaForce::add_field_tangent(const ForceInputs& in, const ParameterBlock& b
                                   Lanes<6>& load1, Lanes<6>& load2) const {
   FieldLanes dir;
   Lanes<3> s1_dir, s2_dir;
-  dir.s1 = block.field<3>(slot1, s1_dir), dir.s2 = block.field<3>(slot2, s2_dir);
+  dir.s1 = block.field<3>(slot1, s1_dir);
+  dir.s2 = block.field<3>(slot2, s2_dir);
   if (!law.moves(block) && !dir.s1 && !dir.s2) return;
   const Law::Value f = at(in, f1, f2);
   Lanes<4> fields;

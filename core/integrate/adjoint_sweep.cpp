@@ -18,7 +18,10 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
     b.theta.setZero(d.slots());
     b.rho.setZero(d.rho.size());
     for (Eigen::MatrixXd* x : {&b.K, &b.Y}) x->setZero(states, rk_.dense_stages);
-    if (rk_.gamma) b.start.setZero(states), b.common.setZero(states);
+    if (rk_.gamma) {
+      b.start.setZero(states);
+      b.common.setZero(states);
+    }
   }
   if (const int coupled = largest_implicit_group(rk_); coupled > 0)
     x_bar_.setZero(coupled * StageEquations::count(d), objectives);
@@ -63,7 +66,11 @@ double AdjointSweep::magnification(const Eigen::VectorXd& psi) const {
 bool AdjointSweep::step_back(const StoredStep& step) {
   rebuild(step);
   for (Bars& b : bars_) b.largest = std::max(b.largest, b.lambda.cwiseAbs().dot(step_.y1.cwiseAbs()));
-  for (Bars& b : bars_) b.lambda_hat.setZero(), b.samples.setZero(), b.K.setZero();
+  for (Bars& b : bars_) {
+    b.lambda_hat.setZero();
+    b.samples.setZero();
+    b.K.setZero();
+  }
   sample_back(step);
   if (rosenbrock_) nodes_back();
 

@@ -64,7 +64,9 @@ void TangentSweep::add_stages(const Block& b, double h, double c, const Weights&
   int terms = 0;
   const auto add = [&](double q, double v, const double* of_stage) {
     if (q == 0 && v == 0) return;
-    of_q[terms] = q, of_v[terms] = v, k[terms++] = of_stage;
+    of_q[terms] = q;
+    of_v[terms] = v;
+    k[terms++] = of_stage;
   };
   add(h * c, 0, b.y0.data() + half);
   for (int j = first; j <= last; ++j) {
@@ -179,7 +181,8 @@ bool TangentSweep::follow_rosenbrock(const Step& step) {
     if (i > 0 && !rosenbrock.linearise_stage(step, i)) return false;
     for (Block& b : blocks_) {
       if (i == 0) {
-        b.Y = b.y0, a_ = b.x.bottomRows(n);
+        b.Y = b.y0;
+        a_ = b.x.bottomRows(n);
       } else {
         add_stages(b, h, of_stage_[stage].c, of_stage_[stage], 0, i - 1, b.y0, b.Y);
         dynamics_.acceleration_tangent(b.parameters, b.Y, a_);

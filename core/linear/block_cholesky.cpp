@@ -105,7 +105,8 @@ void BlockCholesky<N>::set_off_diagonals_to_zero() {
 template <int N>
 bool BlockCholesky<N>::factor() {
   for (std::size_t k = 0; k < diagonal_.size(); ++k) {
-    prefetch(&diagonal_[k], kAhead), prefetch(lower_.data(), first_block_[k] + kAhead);
+    prefetch(&diagonal_[k], kAhead);
+    prefetch(lower_.data(), first_block_[k] + kAhead);
     Block& W = diagonal_[k];
     Vec<N>& inverse = inverse_[k];
     if (!factor_diagonal(W, inverse)) return false;

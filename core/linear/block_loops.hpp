@@ -132,7 +132,8 @@ class BlockLoops {
 #pragma GCC unroll 4
       for (int i = 0; i < Rows; ++i) {
         const Row x = kj[i];
-        sum_q[i] += c[j] * x, sum_v[i] += d[j] * x;
+        sum_q[i] += c[j] * x;
+        sum_v[i] += d[j] * x;
       }
     }
     Row* const to_q = rows(q) + first;

@@ -98,7 +98,9 @@ bool SquareFactor::compute(const MatrixXd& A) {
   constexpr double kSingular = 1e-14;
   const Index n = A.rows();
   auto& [LU, order, inverse_pivots, x, lanes] = *factors_;
-  LU = A, order.setLinSpaced(n, 0, n - 1), inverse_pivots.resize(n);
+  LU = A;
+  order.setLinSpaced(n, 0, n - 1);
+  inverse_pivots.resize(n);
   double largest = 0, least = std::numeric_limits<double>::infinity();
   for (Index k = 0; k < n; ++k) {
     Index pivot = k;
@@ -106,7 +108,8 @@ bool SquareFactor::compute(const MatrixXd& A) {
       if (std::abs(LU(i, k)) > std::abs(LU(pivot, k))) pivot = i;
     if (pivot != k) LU.row(k).swap(LU.row(pivot)), std::swap(order(k), order(pivot));
     const double size = std::abs(LU(k, k));
-    largest = std::max(largest, size), least = std::min(least, size);
+    largest = std::max(largest, size);
+    least = std::min(least, size);
     if (!(size > 0)) return false;
     inverse_pivots(k) = 1 / LU(k, k);
     const double* const from = &LU(k, 0);
@@ -206,7 +209,8 @@ OrthogonalDecomposition& OrthogonalDecomposition::operator=(OrthogonalDecomposit
 OrthogonalDecomposition::~OrthogonalDecomposition() = default;
 
 void OrthogonalDecomposition::compute(const MatrixXd& A, double threshold) {
-  factors_->rows = A.rows(), factors_->cols = A.cols();
+  factors_->rows = A.rows();
+  factors_->cols = A.cols();
   if (factors_->is_empty()) return;
   threshold < 0 ? factors_->cod.setThreshold(Eigen::Default) : factors_->cod.setThreshold(threshold);
   factors_->cod.compute(A);

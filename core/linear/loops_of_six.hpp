@@ -20,7 +20,8 @@ class LoopsOfSix {
       const double a = A[7 * j], b = A[7 * j + 1], c = A[7 * j + 7], determinant = a * c - b * b;
       if (!(a > 0 && determinant > 0)) return false;
       const double d = 1 / a, e = a * (1 / determinant);
-      inverse[j] = d, inverse[j + 1] = e;
+      inverse[j] = d;
+      inverse[j + 1] = e;
       Six first(A + 6 * j), second(A + 6 * j + 6);
       second.subtract(b * d, A + 6 * j);
       second.store(A + 6 * j + 6);
@@ -88,9 +89,13 @@ class LoopsOfSix {
     for (int r = 0; r < count; ++r) {
       const double* const x = a + 6 * r;
       const double* const y = b + 6 * r;
-      sum3.add(alpha[r] * y[3], x), sum4.add(alpha[r] * y[4], x), sum5.add(alpha[r] * y[5], x);
+      sum3.add(alpha[r] * y[3], x);
+      sum4.add(alpha[r] * y[4], x);
+      sum5.add(alpha[r] * y[5], x);
     }
-    sum3.store(to + 18), sum4.store(to + 24), sum5.store(to + 30);
+    sum3.store(to + 18);
+    sum4.store(to + 24);
+    sum5.store(to + 30);
   }
   static void add_weighted_squares(int count, const double* alpha, const RowsInSpace::Columns* nonzero, const double* a,
                                    const double* b, double* aa, double* bb, double* ab) {

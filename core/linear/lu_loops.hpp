@@ -31,7 +31,8 @@ class LuLoops {
 
   static void swap(double& x, double& y) {
     const double z = x;
-    x = y, y = z;
+    x = y;
+    y = z;
   }
   static double size(double x) { return x < 0 ? -x : x; }
 
@@ -46,7 +47,8 @@ class LuLoops {
         Column x(to), y(next);
         for (int k = 0; k < j; ++k) {
           const double* const of_k = X + k * kStride;
-          x.subtract(factor(j, k), of_k), y.subtract(factor(j + 1, k), of_k);
+          x.subtract(factor(j, k), of_k);
+          y.subtract(factor(j + 1, k), of_k);
         }
         x.scale(scale(j));
         x.store(to);
@@ -102,9 +104,11 @@ class LuLoops {
         Column x(C + c * kStride), y(C + (c + 1) * kStride);
         for (int k = 0; k < N; ++k) {
           const double* const of_k = A + k * kStride;
-          x.subtract(B[c + k * kStride], of_k), y.subtract(B[c + 1 + k * kStride], of_k);
+          x.subtract(B[c + k * kStride], of_k);
+          y.subtract(B[c + 1 + k * kStride], of_k);
         }
-        x.store(C + c * kStride), y.store(C + (c + 1) * kStride);
+        x.store(C + c * kStride);
+        y.store(C + (c + 1) * kStride);
       }
     }
     for (; c < N; ++c) {

@@ -27,7 +27,8 @@ struct __attribute__((may_alias)) LaneRow {
   // Sets each entry to the larger of itself and |y|.
   void grow_to(const LaneRow& y) {
     const AlignedPair a = y.low < 0 ? -y.low : y.low, b = y.high < 0 ? -y.high : y.high;
-    low = low > a ? low : a, high = high > b ? high : b;
+    low = low > a ? low : a;
+    high = high > b ? high : b;
   }
   double largest() const {
     const double a = low[0] > low[1] ? low[0] : low[1], b = high[0] > high[1] ? high[0] : high[1];

@@ -119,9 +119,13 @@ class RowLoops {
       if (nonzero->last - nonzero->first == 1) {
         sum -= a[nonzero->first] * from[nonzero->first];
       } else if (nonzero->last != nonzero->first) {
-        sum -= a[0] * from[0], sum -= a[1] * from[1], sum -= a[2] * from[2];
+        sum -= a[0] * from[0];
+        sum -= a[1] * from[1];
+        sum -= a[2] * from[2];
       }
-      sum -= a[3] * x3, sum -= a[4] * x4, sum -= a[5] * x5;
+      sum -= a[3] * x3;
+      sum -= a[4] * x4;
+      sum -= a[5] * x5;
       to[r] = sum;
     }
   }
@@ -144,11 +148,17 @@ class RowLoops {
       if (nonzero->last - nonzero->first == 1) {
         to[nonzero->first] -= a[nonzero->first] * l;
       } else if (nonzero->last != nonzero->first) {
-        to[0] -= a[0] * l, to[1] -= a[1] * l, to[2] -= a[2] * l;
+        to[0] -= a[0] * l;
+        to[1] -= a[1] * l;
+        to[2] -= a[2] * l;
       }
-      x3 -= a[3] * l, x4 -= a[4] * l, x5 -= a[5] * l;
+      x3 -= a[3] * l;
+      x4 -= a[4] * l;
+      x5 -= a[5] * l;
     }
-    to[3] = x3, to[4] = x4, to[5] = x5;
+    to[3] = x3;
+    to[4] = x4;
+    to[5] = x5;
   }
   template <class Lambda>
   static void subtract_transposed(const RowsInSpace& J, const Lambda& lambda, Row* x) {
@@ -167,13 +177,16 @@ class RowLoops {
       Row first = y[p.row], second = y[p.row2];
       if (p.body2 > 0) {
         const Row* b = x + 3 * (p.body2 - 1);
-        first -= b[0] - p.x2[1] * b[2], second -= b[1] + p.x2[0] * b[2];
+        first -= b[0] - p.x2[1] * b[2];
+        second -= b[1] + p.x2[0] * b[2];
       }
       if (p.body1 > 0) {
         const Row* b = x + 3 * (p.body1 - 1);
-        first += b[0] - p.x1[1] * b[2], second += b[1] + p.x1[0] * b[2];
+        first += b[0] - p.x1[1] * b[2];
+        second += b[1] + p.x1[0] * b[2];
       }
-      y[p.row] = first, y[p.row2] = second;
+      y[p.row] = first;
+      y[p.row2] = second;
     }
     for (std::size_t k = 0; k < entry_count; ++k) {
       const RowsInPlane::Entry e = entries[k];
@@ -189,11 +202,15 @@ class RowLoops {
       const Row first = lambda(p.row), second = lambda(p.row2);
       if (p.body2 > 0) {
         Row* b = x + 3 * (p.body2 - 1);
-        b[0] -= first, b[1] -= second, b[2] -= p.x2[0] * second - p.x2[1] * first;
+        b[0] -= first;
+        b[1] -= second;
+        b[2] -= p.x2[0] * second - p.x2[1] * first;
       }
       if (p.body1 > 0) {
         Row* b = x + 3 * (p.body1 - 1);
-        b[0] += first, b[1] += second, b[2] += p.x1[0] * second - p.x1[1] * first;
+        b[0] += first;
+        b[1] += second;
+        b[2] += p.x1[0] * second - p.x1[1] * first;
       }
     }
     for (std::size_t k = 0; k < entry_count; ++k) {
@@ -212,7 +229,9 @@ class RowLoops {
     for (int i = 0; i < 3; ++i) y[3 + i] = b[3 + i] - m.J[i] * x[3] - m.J[i + 3] * x[4] - m.J[i + 6] * x[5];
   }
   static void subtract_mass_times(const RowsInPlane::Body& m, const Row* b, const Row* x, Row* y) {
-    y[0] = b[0] - m.mass * x[0], y[1] = b[1] - m.mass * x[1], y[2] = b[2] - m.inertia * x[2];
+    y[0] = b[0] - m.mass * x[0];
+    y[1] = b[1] - m.mass * x[1];
+    y[2] = b[2] - m.inertia * x[2];
   }
 
   template <class Jacobian>
@@ -260,7 +279,10 @@ class RowLoops {
       largest.grow_to(s);
     };
     std::size_t r = 0;
-    for (; r + 2 <= at.rows; r += 2) correct_row(r, largest_residual[0]), correct_row(r + 1, largest_residual[1]);
+    for (; r + 2 <= at.rows; r += 2) {
+      correct_row(r, largest_residual[0]);
+      correct_row(r + 1, largest_residual[1]);
+    }
     if (r < at.rows) correct_row(r, largest_residual[0]);
     largest_residual[0].grow_to(largest_residual[1]);
     return {largest_x.largest(), largest_residual[0].largest()};

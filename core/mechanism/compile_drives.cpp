@@ -44,7 +44,8 @@ Constraint measured(Compilation& model, const Drive& drive, const std::string& w
   }
   if (drive.type == "point") return point_coordinate(model, drive, where);
   if (drive.type != "distance") throw SceneError(where + ".type: '" + drive.type + "' is not a drive known here");
-  c.body1 = model.body_index(drive.body1, where + ".body1"), c.body2 = model.body_index(drive.body2, where + ".body2");
+  c.body1 = model.body_index(drive.body1, where + ".body1");
+  c.body2 = model.body_index(drive.body2, where + ".body2");
   Distance distance;
   distance.s1 = numbers(model.keep(c.slot1, model.point(c.body1, drive.point1, where + ".point1")));
   distance.s2 = numbers(model.keep(c.slot2, model.point(c.body2, drive.point2, where + ".point2")));

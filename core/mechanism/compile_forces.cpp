@@ -33,14 +33,18 @@ Law law(Compilation& model, const std::optional<Expression>& expression, const s
   }
   const FieldVector<4> x = model.fields.values(coefficients, where);
   const Vec<4> v = numbers(model.keep(result.slot, x));
-  result.k = v(0), result.c = v(1), result.x0 = v(2), result.f0 = v(3);
+  result.k = v(0);
+  result.c = v(1);
+  result.x0 = v(2);
+  result.f0 = v(3);
   return result;
 }
 
 void add(Compilation& model, const Tsda& f, int force, const std::string& where) {
   TsdaForce out;
   out.force = force;
-  out.body1 = model.body_index(f.body1, where + ".body1"), out.body2 = model.body_index(f.body2, where + ".body2");
+  out.body1 = model.body_index(f.body1, where + ".body1");
+  out.body2 = model.body_index(f.body2, where + ".body2");
   out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f.point1, where + ".point1")));
   out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f.point2, where + ".point2")));
   out.law = law(model, f.law, {"l", "ldot"}, {f.stiffness, f.damping, f.free_length, f.actuator}, where);
@@ -110,7 +114,8 @@ void add(Compilation& model, const Applied& f, int force, const std::string& whe
 void add(Compilation& model, const BushingSpec& f, int force, const std::string& where) {
   Bushing out;
   out.force = force;
-  out.body1 = model.body_index(f.body1, where + ".body1"), out.body2 = model.body_index(f.body2, where + ".body2");
+  out.body1 = model.body_index(f.body1, where + ".body1");
+  out.body2 = model.body_index(f.body2, where + ".body2");
   out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f.point1, where + ".point1")));
   out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f.point2, where + ".point2")));
   // R0 = A(p1)'A(p2), row by row
@@ -137,7 +142,10 @@ void add(Compilation& model, const BushingSpec& f, int force, const std::string&
     std::copy(x.begin(), x.end(), law.begin() + static_cast<std::ptrdiff_t>(3 * k));
   }
   const Vec<12> x = numbers(model.keep(out.slot_law, law));
-  out.K = x.segment<3>(0), out.C = x.segment<3>(3), out.Kt = x.segment<3>(6), out.Ct = x.segment<3>(9);
+  out.K = x.segment<3>(0);
+  out.C = x.segment<3>(3);
+  out.Kt = x.segment<3>(6);
+  out.Ct = x.segment<3>(9);
   model.data.forces->of<Bushing>().push_back(std::move(out));
 }
 
@@ -152,7 +160,11 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
       model.fields.value(f.breakaway.value_or(f.coulomb), where + ".breakaway"),
       model.fields.value(f.stribeck_velocity.value_or(1.0), where + ".stribeck_velocity")};
   const Vec<FrictionLaw::kFields> v = numbers(model.keep(law.slot, x));
-  law.coulomb = v(0), law.smooth = v(1), law.viscous = v(2), law.breakaway = v(3), law.stribeck = v(4);
+  law.coulomb = v(0);
+  law.smooth = v(1);
+  law.viscous = v(2);
+  law.breakaway = v(3);
+  law.stribeck = v(4);
   if (!(law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
   if (!(law.stribeck > 0)) throw SceneError(where + ".stribeck_velocity: must be greater than 0");
   if (is_sliding(f.motion, joint.type)) {

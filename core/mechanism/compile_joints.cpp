@@ -107,8 +107,11 @@ void add_constant(Compilation& model, int row, const FieldValue& value) {
 template <class P>
 void place(const JointMeasure<P>& joint, Constraint& c) {
   c.primitive = joint.measure;
-  c.body1 = joint.body1, c.body2 = joint.body2;
-  c.slot1 = joint.slot1, c.slot2 = joint.slot2, c.slot3 = joint.slot3;
+  c.body1 = joint.body1;
+  c.body2 = joint.body2;
+  c.slot1 = joint.slot1;
+  c.slot2 = joint.slot2;
+  c.slot3 = joint.slot3;
 }
 
 void set_factor(Compilation& model, Constraint& c, const FieldValue& factor) {
@@ -140,7 +143,8 @@ void add_joint(Compilation& model, std::size_t i) {
   for (const JointEquation& equation : recipe->equations) {
     Constraint c;
     c.joint = static_cast<int>(i);
-    c.body1 = body1, c.body2 = body2;
+    c.body1 = body1;
+    c.body2 = body2;
     c.primitive = equation.primitive;
     set_vectors(model, c, vectors, equation.s1, equation.s2, equation.s3);
     model.add_constraint(std::move(c));
@@ -219,7 +223,8 @@ JointDisplacement Compilation::joint_displacement(const std::string& name, const
   }
   const std::string path = child_path("joints", joint_index(name, where));
   JointDisplacement x;
-  x.body1 = body_index(joint.body1, path), x.body2 = body_index(joint.body2, path);
+  x.body1 = body_index(joint.body1, path);
+  x.body2 = body_index(joint.body2, path);
   JointVectors vectors(*this, joint, x.body1, x.body2, path);
   x.measure.s1 = numbers(keep(x.slot1, vectors(JointVector::point1)));
   x.measure.s2 = numbers(keep(x.slot2, vectors(JointVector::point2)));
@@ -249,7 +254,8 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
     throw SceneError(where + ": joint '" + name + "' is " + joint.type + " and has no angle");
   }
   JointAngle angle;
-  angle.body1 = body_index(joint.body1, joint_path), angle.body2 = body_index(joint.body2, joint_path);
+  angle.body1 = body_index(joint.body1, joint_path);
+  angle.body2 = body_index(joint.body2, joint_path);
   const FieldVector3 a1 = direction(angle.body1, joint.axis1, joint_path + ".axis1");
   const FieldVector3 a2 = direction(angle.body2, joint.axis2, joint_path + ".axis2");
   FieldVector3 n1, n2;
@@ -289,7 +295,8 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
 
 int Compilation::angle_about(int body1, int body2, const std::optional<PointField>& axis, const std::string& where) {
   JointAngle angle;
-  angle.body1 = body1, angle.body2 = body2;
+  angle.body1 = body1;
+  angle.body2 = body2;
   const FieldVector3 a = direction(body1, axis, where + ".axis"), n = perpendicular(a);
   angle.measure.s1 = numbers(keep(angle.slot1, n));
   angle.measure.s3 = numbers(keep(angle.slot3, cross(a, n)));

@@ -37,16 +37,23 @@ void add_condition(Compilation& model, std::size_t i) {
   out.modulo_turn = sensor->angle() >= 0 && !out.velocity_level;
   const Sensor& spec = model.scene.sensors[static_cast<std::size_t>(out.sensor)];
   const Dimension of = shown_dimension(model.scene, spec).value_or(Dimension{});
-  if (!of.is_none()) out.unit = " " + to_string(of), out.rate_unit = " " + to_string(of / dimension::kTime);
+  if (!of.is_none()) {
+    out.unit = " " + to_string(of);
+    out.rate_unit = " " + to_string(of / dimension::kTime);
+  }
   if (c.value) {
     const FieldValue v = model.fields.value(*c.value, where + ".value");
-    out.has_value = true, out.value = v.value(), out.slot_value = model.fields.slot(v);
+    out.has_value = true;
+    out.value = v.value();
+    out.slot_value = model.fields.slot(v);
   }
   if (c.rate) {
     if (out.velocity_level) throw SceneError(where + ".rate: sensor '" + c.sensor + "' is a velocity: give its value");
     if (!out.rate_sensor) throw SceneError(where + ".rate: the rate of sensor '" + c.sensor + "' is not available");
     const FieldValue v = model.fields.value(*c.rate, where + ".rate");
-    out.has_rate = true, out.rate = v.value(), out.slot_rate = model.fields.slot(v);
+    out.has_rate = true;
+    out.rate = v.value();
+    out.slot_rate = model.fields.slot(v);
   }
   model.data.conditions.push_back(out);
 }

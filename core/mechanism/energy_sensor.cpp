@@ -43,7 +43,8 @@ void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, co
     const auto [i, j] = f.bodies();
     const BodyAt b1 = body_at(y, i), b2 = body_at(y, j);
     FrameBar bar1, bar2;
-    bar1.set_zero(), bar2.set_zero();
+    bar1.set_zero();
+    bar2.set_zero();
     f.pull_back_potential(angles, b1.frame, b2.frame, bar1, bar2, fields);
     to.add_frame(b1, i, bar1);
     to.add_frame(b2, j, bar2);
@@ -90,7 +91,8 @@ std::unique_ptr<SensorFunction> make_energy(Compilation&, const Sensor& s, const
     throw SceneError(where + ".component: is '" + s.component + "'; allowed: kinetic, potential, total");
   }
   auto out = std::make_unique<EnergyFunction>();
-  out->kinetic = s.component != "potential", out->potential = s.component != "kinetic";
+  out->kinetic = s.component != "potential";
+  out->potential = s.component != "kinetic";
   return out;
 }
 

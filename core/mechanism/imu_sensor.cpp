@@ -65,11 +65,13 @@ std::unique_ptr<SensorFunction> make_imu(Compilation& model, const Sensor& s, co
   axis.m = numbers(model.keep(axis.slot, rotated(orientation_of(model, s.axes, where + ".axes"), e)));
   if (s.component[0] == 'w') {
     auto out = std::make_unique<MountRateSensor>();
-    out->body = model.body_index(s.body, where + ".body"), out->axis = axis;
+    out->body = model.body_index(s.body, where + ".body");
+    out->axis = axis;
     return out;
   }
   auto out = std::make_unique<SpecificForceSensor>();
-  out->point = sensor_point(model, s.body, s.point, where), out->axis = axis;
+  out->point = sensor_point(model, s.body, s.point, where);
+  out->axis = axis;
   return out;
 }
 

@@ -16,10 +16,12 @@ double measured(const JointMeasure<P>& joint, bool rate, double reference, const
   Multipliers<1> z = Multipliers<1>::zero();
   (rate ? z.mu1 : z.mu0)(0) = 1;
   FrameBar bar1, bar2;
-  bar1.set_zero(), bar2.set_zero();
+  bar1.set_zero();
+  bar2.set_zero();
   GeometryBar s;
   joint.measure.pull_back(b1.frame, b2.frame, z, bar1, bar2, s);
-  to->add_frame(b1, joint.body1, bar1), to->add_frame(b2, joint.body2, bar2);
+  to->add_frame(b1, joint.body1, bar1);
+  to->add_frame(b2, joint.body2, bar2);
   to->add_slot<3>(joint.slot1, s.s1), to->add_slot<3>(joint.slot2, s.s2), to->add_slot<3>(joint.slot3, s.s3);
   return value;
 }

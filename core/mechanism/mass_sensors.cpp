@@ -54,7 +54,8 @@ struct MassFunction final : SensorFunction {
 std::unique_ptr<SensorFunction> make_mass_sum(Compilation& model, const Sensor& s, const std::string& where) {
   auto out = std::make_unique<MassFunction>();
   out->component = component_of(s, where);
-  out->mean = s.quantity == "centre_of_mass", out->of_velocities = !out->mean;
+  out->mean = s.quantity == "centre_of_mass";
+  out->of_velocities = !out->mean;
   if (out->mean && MassFunction::total_mass(model.data) <= 0) throw SceneError(where + ": no body has a mass");
   return out;
 }

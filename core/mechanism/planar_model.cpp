@@ -22,7 +22,9 @@ enum class Lies { in_plane, along_normal, across };
 class Search {
  public:
   Search(const Scene& scene, const MechanismData& data, int normal) : scene_(scene), data_(data) {
-    model_.n = normal, model_.t1 = (normal + 1) % 3, model_.t2 = (normal + 2) % 3;
+    model_.n = normal;
+    model_.t1 = (normal + 1) % 3;
+    model_.t2 = (normal + 2) % 3;
   }
 
   // Returns the reason why there is no model, or an empty string.
@@ -70,7 +72,9 @@ class Search {
       // (0, n) times p_a
       body.p_b << -n.dot(body.p_a.tail<3>()), body.p_a(0) * n + n.cross(body.p_a.tail<3>());
       const Matrix3d turned = A(body.p_a);
-      body.b1 = turned.row(model_.t1), body.b2 = turned.row(model_.t2), body.n = turned.row(model_.n);
+      body.b1 = turned.row(model_.t1);
+      body.b2 = turned.row(model_.t2);
+      body.n = turned.row(model_.n);
       body.mass = b.mass;
       body.inertia = body.n.dot(b.J * body.n);
       model_.bodies.push_back(body);
@@ -108,9 +112,15 @@ class Search {
 
   std::string add(const Constraint& c) {
     PlanarConstraint out;
-    out.body1 = c.body1, out.body2 = c.body2, out.row = c.row;
-    out.slot1 = c.slot1, out.slot2 = c.slot2, out.slot3 = c.slot3;
-    out.factor = c.factor, out.slot_factor = c.slot_factor, out.angle = c.angle;
+    out.body1 = c.body1;
+    out.body2 = c.body2;
+    out.row = c.row;
+    out.slot1 = c.slot1;
+    out.slot2 = c.slot2;
+    out.slot3 = c.slot3;
+    out.factor = c.factor;
+    out.slot_factor = c.slot_factor;
+    out.angle = c.angle;
     const PlanarBody &b1 = model_.bodies[at(c.body1)], &b2 = model_.bodies[at(c.body2)];
     const std::string tilted = name(c) + " has a direction that is neither in the plane nor across it";
     auto keep = [&](PlanarConstraint::Kind kind) {
@@ -123,7 +133,8 @@ class Search {
           using Kind = PlanarConstraint::Kind;
           if constexpr (!std::is_same_v<P, Coordinate>) out.s1 = b1.in_plane(p.s1), out.s2 = b2.in_plane(p.s2);
           if constexpr (std::is_same_v<P, Coincidence>) {
-            out.row = c.row + model_.t1, out.row2 = c.row + model_.t2;
+            out.row = c.row + model_.t1;
+            out.row2 = c.row + model_.t2;
             return keep(Kind::point);
           } else if constexpr (std::is_same_v<P, Dot1>) {
             const Lies first = lies(c.body1, p.s1, c.slot1), second = lies(c.body2, p.s2, c.slot2);
@@ -255,7 +266,10 @@ PlanarSearch find_planar_model(const Scene& scene, const MechanismData& data) {
     std::string why = search.run();
     if (why.empty()) return {std::make_shared<const PlanarModel>(search.take()), ""};
     const int axes = search.axes_along_normal();
-    if (axes > most) most = axes, reason = std::move(why);
+    if (axes > most) {
+      most = axes;
+      reason = std::move(why);
+    }
   }
   return {nullptr, reason};
 }

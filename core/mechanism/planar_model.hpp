@@ -63,7 +63,8 @@ struct PlanarModel {
   Plane in_plane(const Vector3d& x) const { return {x(t1), x(t2)}; }
   Vector3d in_space(const Plane& x) const {
     Vector3d out = Vector3d::Zero();
-    out(t1) = x.re, out(t2) = x.im;
+    out(t1) = x.re;
+    out(t2) = x.im;
     return out;
   }
 };

@@ -42,8 +42,10 @@ void add_point(const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar
                SensorGradient& to) {
   FrameBar bar;
   bar.set_zero();
-  bar.r = X_bar, bar.rdot = V_bar;
-  bar.A = X_bar * point.s.transpose(), bar.Adot = V_bar * point.s.transpose();
+  bar.r = X_bar;
+  bar.rdot = V_bar;
+  bar.A = X_bar * point.s.transpose();
+  bar.Adot = V_bar * point.s.transpose();
   to.add_frame(body, point.body, bar);
   to.add_slot<3>(point.slot, Vec<3>(body.frame.A.transpose() * X_bar + body.frame.Adot.transpose() * V_bar));
 }
@@ -166,8 +168,12 @@ double PointSensor::evaluate(const MechanismData&, const StatePoint& at, SensorG
 
 PointSensor::Seen PointSensor::seen(const Eigen::VectorXd& y) const {
   Seen x{body_at(y, a.body), body_at(y, b.body), body_at(y, std::max(axes_body, 0)), {}, {}};
-  x.X = x.A.frame.point(a.s), x.V = x.A.frame.point_dot(a.s);
-  if (relative) x.X -= x.B.frame.point(b.s), x.V -= x.B.frame.point_dot(b.s);
+  x.X = x.A.frame.point(a.s);
+  x.V = x.A.frame.point_dot(a.s);
+  if (relative) {
+    x.X -= x.B.frame.point(b.s);
+    x.V -= x.B.frame.point_dot(b.s);
+  }
   return x;
 }
 

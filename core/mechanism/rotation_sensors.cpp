@@ -58,7 +58,8 @@ struct CoordinateFunction final : SensorFunction {
 
 std::unique_ptr<SensorFunction> make_angular_velocity(Compilation& model, const Sensor& s, const std::string& where) {
   auto out = std::make_unique<AngularVelocitySensor>();
-  out->body = model.body_index(s.body, where), out->component = component_of(s, where);
+  out->body = model.body_index(s.body, where);
+  out->component = component_of(s, where);
   out->in_body_frame = s.in_body_frame;
   return out;
 }

@@ -62,7 +62,8 @@ class Loops {
         if (go_on(here)) {
           fresh.push_back(here);
         } else {
-          here = all[0], direction_.setZero();
+          here = all[0];
+          direction_.setZero();
         }
       }
       if (fresh.size() < kBatch) return Outcome::none;
@@ -138,7 +139,8 @@ class Loops {
           [&]<class P>(P& p) {
             if constexpr (requires { p.s1; }) {
               constexpr bool kPoints = !std::is_same_v<P, Dot1>;
-              call(0, kPoints, p.s1), call(1, kPoints, p.s2);
+              call(0, kPoints, p.s1);
+              call(1, kPoints, p.s2);
               if constexpr (requires { p.s3; }) call(0, false, p.s3);
             }
           },
@@ -148,7 +150,8 @@ class Loops {
 
   // x turns a joint's place about the centre of mass of its body, and shifts it.
   void set(const VectorXd& x) {
-    x_ = x, moved_ = given_;
+    x_ = x;
+    moved_ = given_;
     for_each_vector(moved_, x_, [](int, double length, const Vec<6>& by, Vector3d& s) {
       Vector4d turn;
       turn << 1, 0.5 * by.tail<3>();
@@ -161,7 +164,9 @@ class Loops {
     std::vector<Frame> f(at(d_.n) + 1);
     BodyState state;
     for (int i = 1; i <= d_.n; ++i) set_position(p.q.segment<7>(7 * (i - 1)), state, f[at(i)]);
-    p.Phi.setZero(rows_), p.J.setZero(rows_, 6 * d_.n), p.Phi_x.setZero(rows_, x_.size());
+    p.Phi.setZero(rows_);
+    p.J.setZero(rows_, 6 * d_.n);
+    p.Phi_x.setZero(rows_, x_.size());
     Index row = 0;
     for (const Constraint& c : moved_) {
       const double unit = c.quantity() == RowQuantity::length ? 1 / lengths_.whole : 1;
@@ -314,7 +319,10 @@ std::string in_words(const MechanismData& data) {
   const RoundedLoops& r = data.rounded;
   std::vector<std::string> names;
   for (const int j : r.joints) names.push_back("'" + data.joint_names[at(j)] + "'");
-  if (names.size() > kShown) names.resize(kShown), names.emplace_back("...");
+  if (names.size() > kShown) {
+    names.resize(kShown);
+    names.emplace_back("...");
+  }
   return fmt::format(
              "the numbers of joints {} are rounded: the redundant equations of their loop agree only if points move by "
              "{:.1e} m and axes turn by {:.1e} rad. ",

@@ -62,7 +62,9 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
     if (out.norms(i) > 0) out.J.row(i) /= out.norms(i);
   if (out.J.size() == 0) return out;
   LeastSingular least = least_singular(out.J);
-  out.smallest = least.value, out.left = std::move(least.u), out.right = std::move(least.v);
+  out.smallest = least.value;
+  out.left = std::move(least.u);
+  out.right = std::move(least.v);
   return out;
 }
 

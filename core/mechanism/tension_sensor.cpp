@@ -14,7 +14,10 @@ namespace {
 Law::Scratch& scratch_of_this_thread(const MechanismData& data, const Program& program) {
   static thread_local Law::Scratch scratch;
   const std::size_t inputs = static_cast<std::size_t>(data.rho.size()) + 3;
-  if (scratch.inputs.size() != inputs) scratch.inputs.resize(inputs), scratch.gradient.resize(inputs);
+  if (scratch.inputs.size() != inputs) {
+    scratch.inputs.resize(inputs);
+    scratch.gradient.resize(inputs);
+  }
   program.grow(scratch.program);
   return scratch;
 }
@@ -48,10 +51,12 @@ struct TensionFunction final : SensorFunction {
       const Law::Value law = f.law.derivatives(at.t, d.rho, x, xdot, scratch);
       add_law_gradient(f.law, x, xdot, scratch, *to);
       FrameBar bar1, bar2;
-      bar1.set_zero(), bar2.set_zero();
+      bar1.set_zero();
+      bar2.set_zero();
       FieldGradient fields = to->fields();
       f.pull_back_measured(b1.frame, b2.frame, law.f_x, law.f_xdot, bar1, bar2, fields);
-      to->add_frame(b1, i, bar1), to->add_frame(b2, j, bar2);
+      to->add_frame(b1, i, bar1);
+      to->add_frame(b2, j, bar2);
       value = law.f;
     });
     return value;

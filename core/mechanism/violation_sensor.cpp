@@ -92,7 +92,8 @@ struct ViolationFunction final : SensorFunction {
       if (worst.row < c.row || worst.row >= c.row + c.rows()) continue;
       const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
       FrameBar bar1, bar2;
-      bar1.set_zero(), bar2.set_zero();
+      bar1.set_zero();
+      bar2.set_zero();
       GeometryBar s_bar;
       std::visit(
           [&]<class P>(const P& p) {
@@ -104,7 +105,8 @@ struct ViolationFunction final : SensorFunction {
             to.add_slot<1>(c.slot_factor, Vec<1>(value));
           },
           c.primitive);
-      to.add_frame(b1, c.body1, bar1), to.add_frame(b2, c.body2, bar2);
+      to.add_frame(b1, c.body1, bar1);
+      to.add_frame(b2, c.body2, bar2);
       to.add_slot<3>(c.slot1, s_bar.s1), to.add_slot<3>(c.slot2, s_bar.s2), to.add_slot<3>(c.slot3, s_bar.s3);
     }
   }

@@ -18,7 +18,8 @@ inline ConstraintRows add_virtual_work_gradient(const Constraint& c, const Eigen
   set_virtual(eta1, b1.frame);
   set_virtual(eta2, b2.frame);
   FrameBar bar1, bar2;
-  bar1.set_zero(), bar2.set_zero();
+  bar1.set_zero();
+  bar2.set_zero();
   GeometryBar geometry;
   ConstraintRows change(c.rows());
   std::visit(
@@ -32,7 +33,8 @@ inline ConstraintRows add_virtual_work_gradient(const Constraint& c, const Eigen
   to.add_slot<1>(c.slot_factor, Vec<1>(weights.dot(change)));
   fold_virtual(eta1.tail<3>(), bar1);
   fold_virtual(eta2.tail<3>(), bar2);
-  to.add_frame(b1, c.body1, bar1), to.add_frame(b2, c.body2, bar2);
+  to.add_frame(b1, c.body1, bar1);
+  to.add_frame(b2, c.body2, bar2);
   to.add_slot<3>(c.slot1, geometry.s1), to.add_slot<3>(c.slot2, geometry.s2), to.add_slot<3>(c.slot3, geometry.s3);
   return change;
 }

@@ -31,8 +31,10 @@ class BodyInPlane {
       : in_y_(*data.planar), k_(at(body)), q_(StateLayout{data.n}.q(body)), v_(StateLayout{data.n}.v(body)) {}
 
   void read_hat(const Eigen::VectorXd& y_hat, Frame& tilde) {
-    r_hat_ = in_y_.vector(y_hat, q_), rdot_hat_ = in_y_.vector(y_hat, v_);
-    P_hat_ = in_y_.turn(k_, y_hat, q_ + 3), Pdot_hat_ = in_y_.turn(k_, y_hat, v_ + 3);
+    r_hat_ = in_y_.vector(y_hat, q_);
+    rdot_hat_ = in_y_.vector(y_hat, v_);
+    P_hat_ = in_y_.turn(k_, y_hat, q_ + 3);
+    Pdot_hat_ = in_y_.turn(k_, y_hat, v_ + 3);
     P_tilde_ = (1 / std::sqrt(squared_norm(P_hat_))) * P_hat_;
     tilde.r = r_hat_;
     tilde.A = P_tilde_ * P_tilde_;
@@ -84,7 +86,8 @@ class BodyInPlane {
 
   void tilde_tangent(const LaneRows& y_hat_dir, const Frame& tilde, Direction& q_dir, FrameTangent& tilde_dir) const {
     const PlaneDual r = in_y_.vector(r_hat_, y_hat_dir, q_), P = in_y_.turn(k_, P_hat_, y_hat_dir, q_ + 3);
-    q_dir.row(0) = lanes(r.re), q_dir.row(1) = lanes(r.im);
+    q_dir.row(0) = lanes(r.re);
+    q_dir.row(1) = lanes(r.im);
     q_dir.row(2) = (2 / squared_norm(P_hat_)) * (P_hat_.re * lanes(P.im) - P_hat_.im * lanes(P.re));
     set_position(tilde, q_dir, tilde_dir);
   }
@@ -97,7 +100,8 @@ class BodyInPlane {
   void velocity_tangent(const LaneRows& y_hat_dir, const Vec<3>&, const Frame& f, const Direction& q_dir,
                         Direction& v_dir, FrameTangent& f_dir) const {
     const PlaneDual rdot = in_y_.vector(rdot_hat_, y_hat_dir, v_), Pdot = in_y_.turn(k_, Pdot_hat_, y_hat_dir, v_ + 3);
-    v_dir.row(0) = lanes(rdot.re), v_dir.row(1) = lanes(rdot.im);
+    v_dir.row(0) = lanes(rdot.re);
+    v_dir.row(1) = lanes(rdot.im);
     v_dir.row(2) = 2 * (P_.re * lanes(Pdot.im) - P_.im * lanes(Pdot.re)) - dot(P_, Pdot_hat_) * q_dir.row(2);
     set_position(f, q_dir, f_dir);
     f_dir.rdot = {dual(f.rdot.re, lanes(rdot.re)), dual(f.rdot.im, lanes(rdot.im))};

@@ -27,7 +27,8 @@ class BodyInSpace {
 
   void read_hat(const Eigen::VectorXd& y_hat, Frame& tilde) {
     const Vector4d p_hat = y_hat.segment<4>(q_ + 3);
-    r_hat_ = y_hat.segment<3>(q_), v_hat_ = y_hat.segment<7>(v_);
+    r_hat_ = y_hat.segment<3>(q_);
+    v_hat_ = y_hat.segment<7>(v_);
     norm_hat_ = positions_ ? p_hat.norm() : 1.0;
     Vec<7> q;
     q << r_hat_, p_hat / norm_hat_;
@@ -131,7 +132,8 @@ class BodyInSpace {
 
   // The adjoint goes in reverse order: from gradients in q and v to the cotangents of u and delta.
   void start_adjoint(const Eigen::VectorXd& y_bar, Gradient& q_bar, Gradient& v_bar) const {
-    q_bar = y_bar.segment<7>(q_), v_bar = y_bar.segment<7>(v_);
+    q_bar = y_bar.segment<7>(q_);
+    v_bar = y_bar.segment<7>(v_);
   }
   Vec<6> u_bar(const Gradient& v_bar) const {
     Vec<6> x;

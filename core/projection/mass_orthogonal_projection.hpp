@@ -35,9 +35,15 @@ ProjectorOf<Body>::ProjectorOf(const Mechanism& mechanism, Projection what, Free
   const std::size_t n = at(data_.n);
   const Eigen::Index m = rows_.count();
   for (int i = 1; i <= data_.n; ++i) bodies_.emplace_back(data_, i, positions());
-  frames_.resize(n + 1), frames_tilde_.resize(n + 1), bars_.resize(n + 1), load_dirs_.resize(n + 1);
+  frames_.resize(n + 1);
+  frames_tilde_.resize(n + 1);
+  bars_.resize(n + 1);
+  load_dirs_.resize(n + 1);
   frame_dirs_.assign(n + 1, Space::still());
-  q_bars_.resize(n), v_bars_.resize(n), q_dirs_.resize(n), v_dirs_.resize(n);
+  q_bars_.resize(n);
+  v_bars_.resize(n);
+  q_dirs_.resize(n);
+  v_dirs_.resize(n);
   for (auto* x : {&delta_, &u_, &b_, &x_, &corrections_.r, &corrections_.dx, &corrections_.Ex}) x->resize(n);
   for (Y* x : {&nu_, &kappa_, &phi_, &g_, &mu_, &corrections_.rg, &corrections_.dnu}) x->setZero(m);
   angles_.setZero(static_cast<Eigen::Index>(data_.angles.size()));

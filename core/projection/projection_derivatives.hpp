@@ -16,7 +16,8 @@ bool ProjectorOf<Body>::linearise(double t, const Y& angles, const Y& y_hat, con
     return false;
   Space::gather(data_, s.nu, nu_), Space::gather(data_, s.kappa, kappa_);
   for_bodies([&](Body& b, std::size_t i, auto& f) {
-    delta_[i] = s.delta[i].template head<N>(), u_[i] = s.u[i].template head<N>();
+    delta_[i] = s.delta[i].template head<N>();
+    u_[i] = s.u[i].template head<N>();
     b.displace(delta_[i], f);
     b.restore_velocity(y, u_[i], f);
   });

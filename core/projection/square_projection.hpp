@@ -82,7 +82,10 @@ bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) 
       v_size, kUnmetVelocity, [&] { constraints_.phi_dot(frames_, laws_, phi_); },
       [&] {
         solve_square(phi_, dx);
-        for (std::size_t i = 0; i < dx.size(); ++i) dx[i] = -dx[i], u_[i] += dx[i];
+        for (std::size_t i = 0; i < dx.size(); ++i) {
+          dx[i] = -dx[i];
+          u_[i] += dx[i];
+        }
         for_bodies([&](Body& b, std::size_t i, auto& f) { b.add_velocity(u_[i], dx[i], f); });
         return true;
       });

@@ -6,7 +6,8 @@ IntegratorSettings default_integrator(double start_time, double end_time) {
   constexpr double kSteps = 150;  // in the run, at least
   IntegratorSettings settings;
   settings.type = "dopri853";
-  settings.rtol = 1e-8, settings.atol = 1e-10;
+  settings.rtol = 1e-8;
+  settings.atol = 1e-10;
   if (end_time > start_time) settings.max_step = (end_time - start_time) / kSteps;
   return settings;
 }

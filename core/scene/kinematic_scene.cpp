@@ -27,14 +27,20 @@ Scene kinematic_scene(const Scene& scene, std::vector<SceneIssue>& issues) {
       drive.joint = sensor->joint;
     } else if (sensor->quantity == "distance") {
       drive.type = "distance";
-      drive.body1 = sensor->body1.empty() ? "ground" : sensor->body1, drive.body2 = sensor->body2;
-      drive.point1 = sensor->point1, drive.point2 = sensor->point2;
+      drive.body1 = sensor->body1.empty() ? "ground" : sensor->body1;
+      drive.body2 = sensor->body2;
+      drive.point1 = sensor->point1;
+      drive.point2 = sensor->point2;
     } else if (sensor->quantity == "position" && sensor->component != "norm" && !sensor->relative_to &&
                !sensor->in_body_frame) {
       drive.type = "point";
-      drive.body = sensor->body, drive.point2 = sensor->point, drive.coordinate = sensor->component;
+      drive.body = sensor->body;
+      drive.point2 = sensor->point;
+      drive.coordinate = sensor->component;
     } else if (sensor->quantity == "orientation") {
-      drive.type = "coordinate", drive.body = sensor->body, drive.coordinate = sensor->component;
+      drive.type = "coordinate";
+      drive.body = sensor->body;
+      drive.coordinate = sensor->component;
     } else {
       issues.push_back({where + ".sensor", "sensor '" + c.sensor + "' measures " + sensor->quantity +
                                                ", which kinematics cannot hold; use an angle, displacement, distance, "

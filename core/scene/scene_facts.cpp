@@ -202,10 +202,14 @@ const SceneFacts::Scale& SceneFacts::scale() const {
   };
   for (const Body& body : scene_.bodies) {
     mass = std::max(mass, value(body.mass).value_or(0));
-    add(body.position, ""), add(body.com, "");
+    add(body.position, "");
+    add(body.com, "");
     for (const auto& [name, point] : body.points) add(point, "");
   }
-  for (const Joint& joint : scene_.joints) add(joint.point1, joint.body1), add(joint.point2, joint.body2);
+  for (const Joint& joint : scene_.joints) {
+    add(joint.point1, joint.body1);
+    add(joint.point2, joint.body2);
+  }
   for (const Force& force : scene_.forces)
     if (const auto* tsda = std::get_if<Tsda>(&force.kind))
       add(tsda->point1, tsda->body1), add(tsda->point2, tsda->body2);

@@ -157,8 +157,12 @@ struct Assembly::Solution {
     if (!projector->assemble(start, position.angles(), y_guess, y)) return false;
     const auto found = [&](const AssemblyEquations& equations, const VectorXd& x) {
       NearestPoint point;
-      point.status = NearestPointStatus::found, point.determined = true, point.linearised = false;
-      point.x = x, point.F = equations.values_at(y), point.nu = VectorXd::Zero(point.F.size());
+      point.status = NearestPointStatus::found;
+      point.determined = true;
+      point.linearised = false;
+      point.x = x;
+      point.F = equations.values_at(y);
+      point.nu = VectorXd::Zero(point.F.size());
       return point;
     };
     const NearestPoint at = found(position, y.head(N)), moving = found(velocity, y.tail(N));
@@ -167,8 +171,11 @@ struct Assembly::Solution {
     position.accept(y.head(N));
     velocity.hold(y.head(N));
     velocity.set_angles(position.followed_angles());
-    result.y = y, result.residual = left, result.iterations = static_cast<int>(projector->factorisations());
-    q = at, v = moving;
+    result.y = y;
+    result.residual = left;
+    result.iterations = static_cast<int>(projector->factorisations());
+    q = at;
+    v = moving;
     return result.ok = result.in_mode = true;
   }
 
@@ -226,13 +233,16 @@ struct Assembly::Solution {
       else
         d.v_J.push_back({e.row, static_cast<int>(e.column - N), e.value});
     }
-    d.q_b_rho *= -1, d.v_b_rho *= -1;
+    d.q_b_rho *= -1;
+    d.v_b_rho *= -1;
     d.q_g_rho = d.v_g_rho = MatrixXd::Zero(N, P);
     if (is_free(*q)) d.q_g_rho = position_guess_rho(data);
     if (is_free(*q) && q->nu.any()) d.q_g_rho -= position.second(result.y, q->nu).rho;
     if (is_free(*v)) add_velocity_guess_derivatives(data, q->x, g_q, d.v_g_rho);
-    d.v_b_q.resize(velocity.rows(), N), d.v_b_q.setFromTriplets(b_q.begin(), b_q.end());
-    d.v_g_q.resize(N, N), d.v_g_q.setFromTriplets(g_q.begin(), g_q.end());
+    d.v_b_q.resize(velocity.rows(), N);
+    d.v_b_q.setFromTriplets(b_q.begin(), b_q.end());
+    d.v_g_q.resize(N, N);
+    d.v_g_q.setFromTriplets(g_q.begin(), g_q.end());
     if (!is_free(*v) || !v->nu.any()) return d;
     const AssemblyEquations::Gradients S = velocity.second(result.y, v->nu);  // of J_v'nu
     d.v_g_q -= Eigen::SparseMatrix<double>(S.y.leftCols(N).sparseView());
@@ -246,7 +256,8 @@ struct Assembly::Solution {
   static Tangents tangents(const System& q, const System& v, const Derivatives& d) {
     Tangents t;
     t.q = q.solve(d.q_b_rho, d.q_g_rho);
-    t.v_b_of_q = d.v_b_q * t.q, t.v_g = d.v_g_rho + d.v_g_q * t.q;
+    t.v_b_of_q = d.v_b_q * t.q;
+    t.v_g = d.v_g_rho + d.v_g_q * t.q;
     t.v = v.solve(t.v_b_of_q + d.v_b_rho, t.v_g);
     return t;
   }

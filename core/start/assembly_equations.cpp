@@ -140,7 +140,10 @@ VectorXd AssemblyEquations::sizes(const MatrixXd& J) const {
   for (Index k = 0; k < J.cols(); k += 7) {
     for (Index i = 0; i < J.rows(); ++i) {
       const double here = J.row(i).segment<3>(k).squaredNorm();
-      if (here > 0) r += here, p += J.row(i).segment<4>(k + 3).squaredNorm();
+      if (here > 0) {
+        r += here;
+        p += J.row(i).segment<4>(k + 3).squaredNorm();
+      }
     }
   }
   const double length = p > 0 ? std::sqrt(p / r) : 1;
@@ -215,11 +218,15 @@ void AssemblyEquations::for_joint_gradients(AssemblyLevel level, const BodiesAt&
             (positions ? unit.mu0 : unit.mu1) = c.factor * Vec<P::kRows>::Unit(i);
             FrameBar bar1, bar2;
             GeometryBar s;
-            bar1.set_zero(), bar2.set_zero();
+            bar1.set_zero();
+            bar2.set_zero();
             p.pull_back(f1, f2, unit, bar1, bar2, s);
             const Index row = c.row + i;
-            add_body(row, c.body1, bar1), add_body(row, c.body2, bar2);
-            add_field(row, c.slot1, s.s1), add_field(row, c.slot2, s.s2), add_field(row, c.slot3, s.s3);
+            add_body(row, c.body1, bar1);
+            add_body(row, c.body2, bar2);
+            add_field(row, c.slot1, s.s1);
+            add_field(row, c.slot2, s.s2);
+            add_field(row, c.slot3, s.s3);
           }
           if (c.slot_factor < 0) return;
           Vec<P::kRows> phi;
@@ -258,7 +265,8 @@ std::vector<SparseEntry> AssemblyEquations::entries(const VectorXd& y, MatrixXd*
   }
   VectorXd y_bar(y.size()), rho_bar(data_.rho.size());
   for (const AssemblyTarget& target : targets_) {
-    y_bar.setZero(), rho_bar.setZero();
+    y_bar.setZero();
+    rho_bar.setZero();
     add_gradient(data_, target.sensor, t_, y, branches(target), 1, y_bar, rho_bar);
     for (Index k = 0; k < y.size(); ++k) add(row, k, y_bar(k));
     add_field(row, target.slot, Vec<1>(-1));
@@ -315,7 +323,8 @@ void AssemblyEquations::add_target_curvature(const AssemblyTarget& target, const
   VectorXd y_bar(y.size()), rho_bar(P);
   const auto add_linear = [&](const SensorPtr& rate, double weight) {
     for (Index j = 0; j < N; ++j) {
-      y_bar.setZero(), rho_bar.setZero();
+      y_bar.setZero();
+      rho_bar.setZero();
       add_gradient(data_, rate, t_, with_unit_velocity(y, j), branch, weight, y_bar, rho_bar);
       out.y.row(j).head(N) += y_bar.head(N).transpose();
       out.rho.row(j) += rho_bar.transpose();

@@ -46,7 +46,8 @@ void keep_in_plane(const MechanismData& d, Eigen::VectorXd& a) {
     const Index first = StateLayout{d.n}.q(i);
     const Plane r = plane.vector(a, first), P = plane.turn(at(i), a, first + 3);
     a.segment<7>(first).setZero();
-    plane.add_vector(r, first, a), plane.add_turn(at(i), P, first + 3, a);
+    plane.add_vector(r, first, a);
+    plane.add_turn(at(i), P, first + 3, a);
   }
 }
 
@@ -72,11 +73,15 @@ DrivenPath::DrivenPath(const Mechanism& mechanism, Model model)
     : mechanism_(mechanism),
       planar_(model == Model::planar),
       projector_(make_projector(mechanism, Projection::position_velocity, model, Free::nothing)) {
-  y_hat_.setZero(mechanism.states()), y_next_.setZero(mechanism.states());
+  y_hat_.setZero(mechanism.states());
+  y_next_.setZero(mechanism.states());
 }
 
 void DrivenPath::start(double t, double end, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
-  state_.t = first_ = t, last_ = end, state_.y = y, state_.angles = angles;
+  state_.t = first_ = t;
+  last_ = end;
+  state_.y = y;
+  state_.angles = angles;
   state_.a.setZero(mechanism_.states() / 2);
   state_.regularity = projector_->settle(t, angles, y, y_next_) ? regularity() : 0;
   most_regular_ = state_.regularity;
@@ -187,7 +192,10 @@ void DrivenPath::look_for_window() {
     tried.t = locate(tried.t, tried.half, base);
     for (const double spacing : {0.1 * tried.half, 0.01 * tried.half})
       if (const double finer = locate(tried.t, spacing, base); std::abs(finer - tried.t) < spacing) tried.t = finer;
-    if (const double now = fill(tried, base); now < error) error = now, w = std::move(tried);
+    if (const double now = fill(tried, base); now < error) {
+      error = now;
+      w = std::move(tried);
+    }
   }
   state_ = here;
   windows_.insert(std::ranges::upper_bound(windows_, w.t, {}, &SingularWindow::t), std::move(w));

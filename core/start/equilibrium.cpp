@@ -23,16 +23,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostIterations = 5000;  // chains that slide along stiff stops take some hundreds
-constexpr double kLargestStep = 0.2;   // of a coordinate at once [lengths of the mechanism, rad]
-constexpr double kApart = 0.05;        // the places along a step at which forces are computed [the same]
-constexpr double kNearPlaces = 1e-3;   // of a step: places as near to each other are one
-constexpr double kBeside = 1e-5;       // from the equilibrium, to see where the forces drive it [the same]
-constexpr double kTolerance = 1e-11;   // of the last Newton step [lengths of the mechanism, rad]
-constexpr double kRoundingOfForces = 1e-14;    // of the terms of a force: a few additions
-constexpr double kLargestError = 0.5;  // of a step, relative to it: the linear equations predict the rest
-constexpr double kAimedError = 0.25;   // the next step has about this one
-constexpr double kFastest = 0.02;      // of sigma: its largest change from a step to the next
+constexpr int kMostIterations = 5000;        // chains that slide along stiff stops take some hundreds
+constexpr double kLargestStep = 0.2;         // of a coordinate at once [lengths of the mechanism, rad]
+constexpr double kApart = 0.05;              // the places along a step at which forces are computed [the same]
+constexpr double kNearPlaces = 1e-3;         // of a step: places as near to each other are one
+constexpr double kBeside = 1e-5;             // from the equilibrium, to see where the forces drive it [the same]
+constexpr double kTolerance = 1e-11;         // of the last Newton step [lengths of the mechanism, rad]
+constexpr double kRoundingOfForces = 1e-14;  // of the terms of a force: a few additions
+constexpr double kLargestError = 0.5;        // of a step, relative to it: the linear equations predict the rest
+constexpr double kAimedError = 0.25;         // the next step has about this one
+constexpr double kFastest = 0.02;            // of sigma: its largest change from a step to the next
 
 class Statics {
  public:
@@ -281,7 +281,8 @@ std::string go_downhill(Statics& statics, VectorXd& q, int& iterations) {
       if (size < kLargestStep) error = error_along(statics, free, damped, y, q);
       if (error < kLargestError) break;
       if (size < kTolerance) return fmt::format("the forces jump on the way; {}", statics.what_is_left());
-      q = start, statics.set_angles(angles),
+      q = start;
+      statics.set_angles(angles);
       sigma *= std::isfinite(error) ? std::clamp(error / kAimedError, 4., 64.) : 4;
     }
     sigma *= std::max(kFastest, error / kAimedError);

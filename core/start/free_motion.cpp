@@ -74,7 +74,8 @@ class MotionNames {
       for (std::size_t k = 0; k < group.size(); ++k) {
         const Vec<6> of_body = motion.segment<6>(6 * static_cast<Index>(k));
         xi.segment<6>(layout_.z(group[k])) = of_body;
-        fastest = std::max(fastest, of_body.head<3>().norm()), turning = std::max(turning, of_body.tail<3>().norm());
+        fastest = std::max(fastest, of_body.head<3>().norm());
+        turning = std::max(turning, of_body.tail<3>().norm());
       }
     }
     const double size = turning > kZero * fastest ? turning : fastest;

@@ -51,9 +51,11 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Derivative what, double t0, do
     if (t1 - t0 > kWide * shortest) wide = std::abs(change);
     const TimeLaw::Jet m = at(law, middle);
     if (std::abs(difference(a, m, middle - t0)) >= std::abs(difference(m, b, t1 - middle))) {
-      t1 = middle, b = m;
+      t1 = middle;
+      b = m;
     } else {
-      t0 = middle, a = m;
+      t0 = middle;
+      a = m;
     }
   }
 }

@@ -39,7 +39,8 @@ struct FreeDirections {
 
 FreeDirections free_directions(const MechanismData& d, const StatePoint& at, double length) {
   AssemblyEquations position(d, AssemblyLevel::position, at.t), velocity(d, AssemblyLevel::velocity, at.t);
-  position.start_branches(at.y), velocity.start_branches(at.y);
+  position.start_branches(at.y);
+  velocity.start_branches(at.y);
   const Index rows = d.m + d.n, half = StateLayout{d.n}.positions();  // without conditions on sensors
   const AssemblyEquations::Gradients F = position.gradients(at.y), G = velocity.gradients(at.y);
   VectorXd unit = VectorXd::Ones(half);
@@ -48,7 +49,10 @@ FreeDirections free_directions(const MechanismData& d, const StatePoint& at, dou
   MatrixXd J_dot = G.y.topLeftCorner(rows, half) * unit.asDiagonal();
   for (Index r = 0; r < rows; ++r) {
     const double norm = J.row(r).norm();
-    if (norm > 0) J.row(r) /= norm, J_dot.row(r) /= norm;
+    if (norm > 0) {
+      J.row(r) /= norm;
+      J_dot.row(r) /= norm;
+    }
   }
   FreeDirections x;
   x.N = null_space(J, UnitRows::kRankThreshold);
@@ -72,7 +76,9 @@ void add_eigenvalues(Linearisation& x) {
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),  // keeps pairs together
                    [&](Index i, Index j) { return std::abs(eigen.values(i)) < std::abs(eigen.values(j)); });
-  x.eigenvalues.resize(2 * f), x.errors.resize(2 * f), x.modes.resize(x.basis.rows(), 2 * f);
+  x.eigenvalues.resize(2 * f);
+  x.errors.resize(2 * f);
+  x.modes.resize(x.basis.rows(), 2 * f);
   for (Index k = 0; k < 2 * f; ++k) {
     const Index i = order[static_cast<std::size_t>(k)];
     x.eigenvalues(k) = per_time * eigen.values(i);

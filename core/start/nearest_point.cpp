@@ -59,7 +59,9 @@ class NearestPointSearch {
     return true;
   }
   void settle_without_multipliers(const VectorXd& x, const VectorXd& F) {
-    result_.x = x, result_.F = F, result_.nu = VectorXd::Zero(F.size());
+    result_.x = x;
+    result_.F = F;
+    result_.nu = VectorXd::Zero(F.size());
     result_.status = NearestPointStatus::found;
     result_.linearised = false;
   }
@@ -105,10 +107,14 @@ class NearestPointSearch {
       if (!satisfied() && length <= 2 * kEpsilon * size()) return false;  // nothing shows a direction
       closest = std::min(closest, rows.scale.cwiseProduct(result_.F).norm());
       if (length < 0.9 * shortest) {
-        shortest = length, waited = 0;
+        shortest = length;
+        waited = 0;
       } else if (++waited == kPatience) {
         if (!(closest < 0.7 * closest_before)) return false;
-        closest_before = closest, shortest = kInfinity, waited = 0, part /= 4;
+        closest_before = closest;
+        shortest = kInfinity;
+        waited = 0;
+        part /= 4;
         if (decomposes_) move(result_.x + along(kBeside * sizes));
         continue;
       }

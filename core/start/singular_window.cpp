@@ -30,9 +30,14 @@ bool SingularWindow::for_nodes(double time, const std::function<bool(double, con
 
 DrivenState SingularWindow::state_at(double time) const {
   DrivenState s = nodes.front();
-  s.t = time, s.y.setZero(), s.angles.setZero(), s.a.setZero();
+  s.t = time;
+  s.y.setZero();
+  s.angles.setZero();
+  s.a.setZero();
   for_nodes(time, [&](double weight, const DrivenState& node) {
-    s.y += weight * node.y, s.angles += weight * node.angles, s.a += weight * node.a;
+    s.y += weight * node.y;
+    s.angles += weight * node.angles;
+    s.a += weight * node.a;
     return true;
   });
   return s;
@@ -62,8 +67,10 @@ const Motion& ContinuedMotion::motion(const StatePoint& at) {
   Index k = 0;
   w->for_nodes(at.t, [&](double, const DrivenState& node) {
     motion_ = solved_.motion({node.t, node.y, node.angles});
-    z.resize(flat(motion_.z).size(), SingularWindow::kNodes), lambda.resize(motion_.lambda.size(), z.cols());
-    z.col(k) = flat(motion_.z), lambda.col(k++) = motion_.lambda;
+    z.resize(flat(motion_.z).size(), SingularWindow::kNodes);
+    lambda.resize(motion_.lambda.size(), z.cols());
+    z.col(k) = flat(motion_.z);
+    lambda.col(k++) = motion_.lambda;
     return true;
   });
   const SingularWindow::Weights weights = w->weights(at.t);
@@ -115,7 +122,8 @@ std::string in_words(const std::vector<SingularPosition>& positions, const std::
     lacking.insert(s.lacking.begin(), s.lacking.end());
     for (const int k : parameter_names.empty() ? std::vector<int>{} : s.parameters)
       parameters.insert("'" + parameter_names[at(k)] + "'");
-    half = std::max(half, s.half), is_rough = is_rough || s.half == 0;
+    half = std::max(half, s.half);
+    is_rough = is_rough || s.half == 0;
   }
   if (count == 0) return {};
   std::string words = fmt::format("singular position at t = {:.5g} s{}", first,

@@ -48,7 +48,8 @@ StateQuery::StateQuery(const Mechanism& mechanism, const FormulationSettings& fo
       y_(at.y),
       angles_(at.angles) {
   SpatialDynamics& dynamics = equations_->dynamics;
-  equations_->position.set_angles(angles_), equations_->velocity.set_angles(angles_);
+  equations_->position.set_angles(angles_);
+  equations_->velocity.set_angles(angles_);
   const StateLayout layout{data_.n};
   VectorXd ydot(y_.size());
   if (!dynamics.evaluate(t_, y_, angles_, ydot))
@@ -73,8 +74,12 @@ BodyMotion StateQuery::body(const std::string& name) const {
   const StateLayout layout{data_.n};
   const int i = number_of(data_, name);
   BodyMotion m;
-  m.r = y_.segment<3>(layout.q(i)), m.rdot = y_.segment<3>(layout.v(i)), m.rddot = a_.segment<3>(layout.q(i));
-  m.p = y_.segment<4>(layout.p(i)), m.pdot = y_.segment<4>(layout.pdot(i)), m.pddot = a_.segment<4>(layout.p(i));
+  m.r = y_.segment<3>(layout.q(i));
+  m.rdot = y_.segment<3>(layout.v(i));
+  m.rddot = a_.segment<3>(layout.q(i));
+  m.p = y_.segment<4>(layout.p(i));
+  m.pdot = y_.segment<4>(layout.pdot(i));
+  m.pddot = a_.segment<4>(layout.p(i));
   m.A = mbsopt::A(m.p);
   m.omega = m.A * (2 * G_times(m.p, m.pdot));
   m.omegadot = m.A * (2 * G_times(m.p, m.pddot));
@@ -94,7 +99,8 @@ StateQuery::Rows StateQuery::rows(const std::string& name) const {
   for (const Constraint& c : data_.constraints) {
     const std::string& owner = c.drive >= 0 ? data_.drive_names[at(c.drive)] : data_.joint_names[at(c.joint)];
     if (owner != name) continue;
-    first = std::min<Index>(first, c.row), end = std::max<Index>(end, c.row + c.rows());
+    first = std::min<Index>(first, c.row);
+    end = std::max<Index>(end, c.row + c.rows());
   }
   if (end == 0) throw std::invalid_argument("there is no joint or drive '" + name + "'");
   return {first, end - first};

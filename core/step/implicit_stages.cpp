@@ -50,8 +50,11 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
   for (Points* points : {&past_, &present_}) {
     points->places.assign(static_cast<std::size_t>(rk_.stages), {0, Eigen::VectorXd::Zero(rows)});
   }
-  x_.setZero(rows, largest), r_.setZero(rows * largest, 1), change_.setZero(layout_.size(), largest);
-  a_start_.setZero(layout_.positions()), lambda_start_.setZero(data_.m);
+  x_.setZero(rows, largest);
+  r_.setZero(rows * largest, 1);
+  change_.setZero(layout_.size(), largest);
+  a_start_.setZero(layout_.positions());
+  lambda_start_.setZero(data_.m);
   y_.setZero(layout_.size());
 }
 
@@ -216,7 +219,8 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal go
   const bool exact = goal != Goal::tolerance;
   for (int i = 0; i < g.size(); ++i) {
     if (goal == Goal::polish) {
-      x_.col(i) << step.K.col(g.first + i).tail(layout_.positions()), step.lambda.col(g.first + i);
+      x_.col(i) << step.K.col(g.first + i).tail(layout_.positions());
+      step.lambda.col(g.first + i);
     } else {
       predict(step, g.first + i, x_.col(i));
     }

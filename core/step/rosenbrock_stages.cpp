@@ -8,7 +8,8 @@ RosenbrockStages::RosenbrockStages(const Mechanism& mechanism, const Method& met
 }
 
 bool RosenbrockStages::begin(const Step& step) {
-  ++evaluations_, ++jacobians_;
+  ++evaluations_;
+  ++jacobians_;
   if (!dynamics_.evaluate(step.t, step.y0, step.angles0, f_)) return false;
   matrix_.linearise(step.t, step.y0, step.angles0, f_.tail(f_.size() / 2), dynamics_.lambda());
   return true;

@@ -103,7 +103,8 @@ double SingularPassage::magnified(double theta) const {
 void SingularPassage::forget() {
   before_.known = last_.known = tried_.known = false;
   most_ = 0;
-  ahead_ = {}, found_ = {};
+  ahead_ = {};
+  found_ = {};
   behind_ = -kNone;
 }
 
@@ -130,7 +131,9 @@ SingularPassage::Estimate SingularPassage::estimate() const {
 }
 
 bool SingularPassage::well_placed(double t, double h, double wanted, double most, const Eigen::VectorXd& response) {
-  now_.t = t + h, now_.response = response, now_.known = true;
+  now_.t = t + h;
+  now_.response = response;
+  now_.known = true;
   now_.inverse = 1 / std::cbrt(std::max(response.norm(), 1e-300));
   found_ = ahead_;
   if (!last_.known) return true;

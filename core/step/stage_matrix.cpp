@@ -30,11 +30,15 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
   find_joints(jacobian);
   if (BlockLu::takes(7 * stages)) make_blocks(data, jacobian);
   values_.resize(at(stages));
-  P_.setZero(stages, stages), P2_.setZero(stages, stages);
+  P_.setZero(stages, stages);
+  P2_.setZero(stages, stages);
   W_.setZero(data.m);
-  right_.setZero(size(), kLanes), step_.setZero(size(), kLanes);
-  v_.setZero(stages * accelerations_), q_.setZero(v_.size());
-  probe_.setZero(size()), answer_.setZero(size());
+  right_.setZero(size(), kLanes);
+  step_.setZero(size(), kLanes);
+  v_.setZero(stages * accelerations_);
+  q_.setZero(v_.size());
+  probe_.setZero(size());
+  answer_.setZero(size());
 }
 
 void StageMatrix::find_joints(const MotionJacobian& jacobian) {
@@ -74,7 +78,8 @@ void StageMatrix::make_blocks(const MechanismData& data, const MotionJacobian& j
     }
     most = std::max(most, at(joint.rows) * joint.bodies.size());
   }
-  G_.resize(most), JW_.resize(most);
+  G_.resize(most);
+  JW_.resize(most);
   by_body_.setZero(data.n * blocks_->stride());
 }
 
@@ -227,7 +232,8 @@ bool StageMatrix::factor_sparse() {
 // Tries the factor on the forces of alternating accelerations of 1, with constraints. The residual of the answer must
 // be small against the largest force in it.
 bool StageMatrix::is_accurate() {
-  answer_.setZero(), probe_.setZero();
+  answer_.setZero();
+  probe_.setZero();
   double largest = 0;
   for (int i = 0; i < stages_; ++i) {
     for (int b = 0; b < jacobian_->bodies(); ++b) {
@@ -369,7 +375,8 @@ void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
 template <bool Transposed>
 void StageMatrix::subtract_times(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
   if (Transposed) {
-    v_.setZero(), q_.setZero();
+    v_.setZero();
+    q_.setZero();
   } else {
     add_G(-1, x, y);  // leaves x combined
   }
@@ -411,7 +418,8 @@ void StageMatrix::subtract_times(const Eigen::Ref<const Eigen::VectorXd>& x, Eig
 
 // v_i = sum_j P_ij a_j,  q_i = sum_j (P^2)_ij a_j
 void StageMatrix::combine(const Eigen::Ref<const Eigen::VectorXd>& x) {
-  v_.setZero(), q_.setZero();
+  v_.setZero();
+  q_.setZero();
   for (int i = 0; i < stages_; ++i) {
     for (int j = 0; j < stages_; ++j) {
       const auto a = x.segment(j * per_stage_, accelerations_);
@@ -454,7 +462,8 @@ void StageMatrix::add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
 
 void StageMatrix::add_G_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
                                    Eigen::Ref<Eigen::VectorXd> y) {
-  v_.setZero(), q_.setZero();
+  v_.setZero();
+  q_.setZero();
   for_each_row([&](const auto& of, auto k, auto row, auto body, auto combined) {
     const double lambda = x(row);
     v_.segment<7>(combined) += lambda * of.row_v[k].transpose();

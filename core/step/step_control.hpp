@@ -40,7 +40,9 @@ class StepController {
     if (options.controller == "I") {
       a_ = 1 / k;
     } else if (options.controller == "PID") {
-      a_ = 0.58 / k, b_ = 0.21 / k, c_ = 0.1 / k;
+      a_ = 0.58 / k;
+      b_ = 0.21 / k;
+      c_ = 0.1 / k;
     } else {
       b_ = 0.2 / k;
       a_ = 1 / k - 0.75 * b_;

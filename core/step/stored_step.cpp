@@ -9,14 +9,18 @@ namespace {
 template <class StepType, class Function>
 void for_each_part(StepType& step, int stages, Function&& f) {
   const auto whole = [&](auto& x) { f(x.data(), x.size()); };
-  whole(step.y0), whole(step.angles0), whole(step.y_hat), whole(step.y1);
+  whole(step.y0);
+  whole(step.angles0);
+  whole(step.y_hat);
+  whole(step.y1);
   const Eigen::Index half = step.y0.size() / 2;
   for (int i = 0; i < stages; ++i) f(step.K.col(i).data() + half, half);
   f(step.lambda.data(), step.lambda.rows() * stages);
   for (auto* x : {&step.projection.delta, &step.projection.u}) {
     if (!x->empty()) f(x->front().data(), 6 * static_cast<Eigen::Index>(x->size()));
   }
-  whole(step.projection.nu), whole(step.projection.kappa);
+  whole(step.projection.nu);
+  whole(step.projection.kappa);
 }
 
 }  // namespace
@@ -34,7 +38,10 @@ StoredStep::StoredStep(const Step& step, const Method& rk, std::span<const Sampl
 }
 
 void StoredStep::restore(const Method& rk, Step& step) const {
-  step.t = t, step.h = h, step.t1 = t1, step.dense = dense;
+  step.t = t;
+  step.h = h;
+  step.t1 = t1;
+  step.dense = dense;
   const double* from = numbers_.get();
   for_each_part(step, step.stages(rk), [&](double* to, Eigen::Index size) {
     std::copy_n(from, size, to);

@@ -49,7 +49,10 @@ template <int S, int T>
 constexpr bool rows_sum_to_c(const Tableau<S, T>& rk) {
   for (std::size_t i = 0; i < T; ++i) {
     double sum = -rk.c[i], size = 1;
-    for (std::size_t j = 0; j < T; ++j) sum += rk.A[i][j], size += magnitude(rk.A[i][j]);
+    for (std::size_t j = 0; j < T; ++j) {
+      sum += rk.A[i][j];
+      size += magnitude(rk.A[i][j]);
+    }
     if (magnitude(sum) > 1e-15 * size) return false;
   }
   return true;
@@ -58,7 +61,10 @@ template <int S, int T>
 constexpr bool gamma_rows_sum(const Tableau<S, T>& rk) {
   for (std::size_t i = 0; i < T; ++i) {
     double sum = -rk.gamma_sum[i], size = 1;
-    for (std::size_t j = 0; j < T; ++j) sum += rk.gamma[i][j], size += magnitude(rk.gamma[i][j]);
+    for (std::size_t j = 0; j < T; ++j) {
+      sum += rk.gamma[i][j];
+      size += magnitude(rk.gamma[i][j]);
+    }
     if (magnitude(sum) > 1e-15 * size || rk.gamma[i][i] != rk.gamma[0][0]) return false;
   }
   return true;
@@ -77,7 +83,10 @@ template <int S, int T>
 constexpr bool dense_ends_at_step(const Tableau<S, T>& rk) {
   for (std::size_t i = 0; i < T; ++i) {
     double sum = i < S ? -rk.b[i] : 0.0, size = 1;
-    for (const double d : rk.dense[i]) sum += d, size += magnitude(d);
+    for (const double d : rk.dense[i]) {
+      sum += d;
+      size += magnitude(d);
+    }
     if (magnitude(sum) > 1e-15 * size) return false;
   }
   return true;

@@ -67,11 +67,15 @@ constexpr Method method(const Tableau<S, T>& rk) {
   m.error = rk.error.data();
   if (any_nonzero(rk.error_low)) m.error_low = rk.error_low.data();
   m.dense = rk.dense[0].data();
-  m.nodes = S, m.node_c = m.c, m.node_b = m.b;
+  m.nodes = S;
+  m.node_c = m.c;
+  m.node_b = m.b;
   if (rk.gamma[0][0] != 0) {
     m.gamma = rk.gamma[0].data();
     m.gamma_sum = rk.gamma_sum.data();
-    m.nodes = static_cast<int>(kGaussNodes.size()), m.node_c = kGaussNodes.data(), m.node_b = kGaussWeights.data();
+    m.nodes = static_cast<int>(kGaussNodes.size());
+    m.node_c = kGaussNodes.data();
+    m.node_b = kGaussWeights.data();
   }
   m.error_filter = rk.error_filter;
   m.adaptive = any_nonzero(rk.error);

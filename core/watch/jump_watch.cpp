@@ -67,7 +67,8 @@ void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Pr
     Switch s{{}, {}, false, 0, 0, 0};
     bool varies = false;
     for (const int input : p.used_inputs()) {
-      varies = varies || input >= P, s.motion = s.motion || (input >= P && input != time);
+      varies = varies || input >= P;
+      s.motion = s.motion || (input >= P && input != time);
       if (input < P && std::find(d.active.begin(), d.active.end(), input) != d.active.end())
         s.parameters.push_back(input);
     }
@@ -92,7 +93,9 @@ void JumpWatch::set_inputs(const Function& f, const StatePoint& at) {
     d.forces->visit_law(f.place, [&](const auto& force) {
       const auto [i, j] = force.bodies();
       const auto [x, xdot] = force.measured(at.angles, body_at(at.y, i).frame, body_at(at.y, j).frame);
-      inputs_[P] = x, inputs_[P + 1] = xdot, inputs_[P + 2] = at.t;
+      inputs_[P] = x;
+      inputs_[P + 1] = xdot;
+      inputs_[P + 2] = at.t;
     });
   } else if (f.of == Inputs::sensors) {
     for (const int input : f.program->used_inputs())
@@ -102,7 +105,9 @@ void JumpWatch::set_inputs(const Function& f, const StatePoint& at) {
 }
 
 std::string JumpWatch::begin(const StatePoint& at) {
-  t0_ = at.t, y0_ = at.y, angles_ = at.angles;
+  t0_ = at.t;
+  y0_ = at.y;
+  angles_ = at.angles;
   for (Function& f : functions_) {
     set_inputs(f, {at.t, at.y, at.angles, motion_});
     for (Switch& s : f.switches) s.last = sign_of(s.program.value(inputs_, scratch_));
@@ -152,8 +157,10 @@ bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
     turn = std::max(turn, std::abs(value(f, *f.program, theta) - (1 - theta) * f0 - theta * f1));
   const bool bends = kink || turn > kTurn * std::abs(f1 - f0);
   if (!std::isfinite(size) || !(jumps || (bends && !f.bends))) return false;
-  f.jump.size = jumps ? near.jump : 0, f.jump.t = t0_ + to * (t1_ - t0_);
-  f.jump.parameters = s.parameters, f.jump.motion = s.motion;
+  f.jump.size = jumps ? near.jump : 0;
+  f.jump.t = t0_ + to * (t1_ - t0_);
+  f.jump.parameters = s.parameters;
+  f.jump.motion = s.motion;
   found_.push_back(f.jump);
   if (!jumps) return f.bends = true;
   f.parameters.insert(f.parameters.end(), s.parameters.begin(), s.parameters.end());
@@ -164,7 +171,8 @@ bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
 std::string JumpWatch::look_at(const SeenStep& step) {
   const StatePoint& at = step.to;
   if (at.t < t0_ + apart_) return {};
-  t1_ = at.t, y1_ = at.y;
+  t1_ = at.t;
+  y1_ = at.y;
   look_at_directions();
   for (Function& f : functions_) {
     if (f.switches.empty()) continue;
@@ -181,7 +189,9 @@ std::string JumpWatch::look_at(const SeenStep& step) {
     }
     if (found) std::erase_if(f.switches, [&](const Switch& s) { return !f.is_new(s); });
   }
-  t0_ = t1_, y0_ = y1_, angles_ = at.angles;
+  t0_ = t1_;
+  y0_ = y1_;
+  angles_ = at.angles;
   return {};
 }
 

@@ -21,7 +21,9 @@ std::string PenaltyWatch::look_at(const SeenStep& seen) {
       const Vector3d omega = omega_B(p, step.y1.segment<4>(layout.pdot(i)) - from.segment<4>(layout.pdot(i)));
       return b.mass * r.squaredNorm() + omega.dot(b.J * omega);
     };
-    projected += energy_norm(step.y_hat), moved += energy_norm(step.y0), mass += b.mass;
+    projected += energy_norm(step.y_hat);
+    moved += energy_norm(step.y0);
+    mass += b.mass;
   }
   projected_ += std::sqrt(projected);
   moved_ += std::sqrt(moved) + step.h * data_.gravity.norm() * std::sqrt(mass);

@@ -27,8 +27,10 @@ std::vector<QuadratureNode> pulse_nodes(const Method& method) {
   std::vector<QuadratureNode> nodes = quadrature_nodes(method.nodes, method.node_c, method.node_b, node_of);
   if (!method.gamma) return nodes;
   for (QuadratureNode& node : nodes) node.e = 0;
-  for (QuadratureNode& stage : quadrature_nodes(method.stages, method.c, method.b, node_of))
-    stage.b = 0, nodes.push_back(stage);
+  for (QuadratureNode& stage : quadrature_nodes(method.stages, method.c, method.b, node_of)) {
+    stage.b = 0;
+    nodes.push_back(stage);
+  }
   return nodes;
 }
 
@@ -84,7 +86,8 @@ void PulseWatch::integrate(Function& f) {
       piece.ft = 0.5 * (f.t(i) + f.t(i + 1)) * piece.f;
       if (how != Interpolation::hold) piece.ft += h * h / 12 * (y[i + 1] - y[i]);
     }
-    sum.f += piece.f, sum.ft += piece.ft;
+    sum.f += piece.f;
+    sum.ft += piece.ft;
     f.of_size += std::abs(piece.f);
   }
 }
@@ -105,7 +108,9 @@ PulseWatch::Candidate PulseWatch::candidate(Function& f, double t, double h, boo
   double mean = 0, so_far = 0, null = 0;
   for (const QuadratureNode& n : nodes_) {
     const double there = value(f, t + n.c * h);
-    mean += n.b * there, so_far += n.b * (1 - n.c) * there, null += n.e * there;
+    mean += n.b * there;
+    so_far += n.b * (1 - n.c) * there;
+    null += n.e * there;
   }
   if (nodes_.size() == 1) null = 0;
   const Integrals i0 = integrals_to(f, t), i1 = integrals_to(f, t + h);

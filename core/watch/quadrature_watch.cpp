@@ -78,7 +78,8 @@ void QuadratureWatch::take_gradient(std::size_t cost, int node, double weight, V
 
 std::string QuadratureWatch::end_step(const Step& step) {
   if (start_ == end_) start_ = end_ = step.t;
-  start_ = std::min(start_, step.t), end_ = std::max(end_, step.t + step.h);
+  start_ = std::min(start_, step.t);
+  end_ = std::max(end_, step.t + step.h);
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     if (!costs_[o].running) continue;
     const double error = add_error(step, 0, o);
@@ -108,7 +109,8 @@ double QuadratureWatch::add_error(const Step& step, std::size_t integrand, std::
   }
   double size = 0, difference = 0;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    size += step.h * std::abs(nodes_[k].b * distinct_[k]), difference += step.h * nodes_[k].e * distinct_[k];
+    size += step.h * std::abs(nodes_[k].b * distinct_[k]);
+    difference += step.h * nodes_[k].e * distinct_[k];
   }
   int power = static_cast<int>(nodes_.size()) - 1;
   if (power == 0) {
@@ -121,7 +123,10 @@ double QuadratureWatch::add_error(const Step& step, std::size_t integrand, std::
   const double share = std::min(1.0, std::abs(difference) / size);
   const double error = size * std::pow(share, static_cast<double>(method_.order) / power);
   integral.error += error;
-  if (error > integral.worst) integral.worst = error, integral.worst_t = step.t;
+  if (error > integral.worst) {
+    integral.worst = error;
+    integral.worst_t = step.t;
+  }
   return error;
 }
 
@@ -135,9 +140,13 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
   double at = 0, largest = -1;
   const auto take = [&](double s) {
     const double here = s >= 0 && s <= 1 ? size(s) : -1;
-    if (here > largest) at = s, largest = here;
+    if (here > largest) {
+      at = s;
+      largest = here;
+    }
   };
-  take(0), take(1);
+  take(0);
+  take(1);
   for (int i = 0; i < kPoints; ++i) take((i + kOffset) / kPoints);
   if (largest == 0) return kNone;
   const double first = largest;
@@ -146,7 +155,8 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
   double product = std::numeric_limits<double>::infinity();
   for (double width = 1.0 / kPoints; width > narrowest; width /= 2) {
     const double s = at;
-    take(s - 0.5 * width), take(s + 0.5 * width);
+    take(s - 0.5 * width);
+    take(s + 0.5 * width);
     if (!std::isfinite(largest)) return step.t + at * h;
     if (width < kBounded && largest < 3 * first) return kNone;  // the usual case
     if (width > halfway) product = std::min(product, width * largest);
@@ -174,7 +184,8 @@ void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
     Integral motion = integrals_[place(0, o)];
     const Integral& parameters = integrals_[place(1, o)];
     const double influence = influence_.col(static_cast<Eigen::Index>(o)).dot(fastest_);
-    motion.error *= end_ - start_, motion.of_size = std::max(motion.of_size, influence) * (end_ - start_);
+    motion.error *= end_ - start_;
+    motion.of_size = std::max(motion.of_size, influence) * (end_ - start_);
     for (const Integral* part : {static_cast<const Integral*>(&motion), &parameters})
       judge(*part, motion.of_size + parameters.of_size, cost.is_extreme ? 0 : kMetExactly, cost,
             statistics.gradient_quadrature);

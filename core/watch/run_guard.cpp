@@ -121,7 +121,8 @@ std::string RunGuard::look_at(const SeenStep& step) {
   energy_drift_ = std::max(energy_drift_, std::abs(energy_final_ - energy_initial_));
   if (!objects_) return {};
   std::string words = law_jumps_.between(before_t_, t);  // from one step before: this one may begin at a jump
-  before_t_ = last_t_, last_t_ = t;
+  before_t_ = last_t_;
+  last_t_ = t;
   if (words.empty() && step.worst_residual > kUnmetAcceleration) {
     words = fmt::format(
         "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: the linkage locks there (a "

@@ -48,7 +48,10 @@ StiffnessWatch::StiffnessWatch(const Method& rk, Eigen::Index states) {
     if (rk.c[i] == rk.c[second_]) first_ = i, pair_ = Pair::in_step;
   if (pair_ == Pair::none && rk.c[second_] == 1 && !is_end_of_step(rk, second_)) pair_ = Pair::across_steps;
   if (pair_ != Pair::none) boundary_ = real_stability_boundary(rk);
-  if (pair_ == Pair::across_steps) Y_last_.setZero(states), K_last_.setZero(states);
+  if (pair_ == Pair::across_steps) {
+    Y_last_.setZero(states);
+    K_last_.setZero(states);
+  }
 }
 
 std::string StiffnessWatch::look_at(const SeenStep& seen) {
@@ -57,8 +60,10 @@ std::string StiffnessWatch::look_at(const SeenStep& seen) {
     compare(step.Y.col(first_), step.K.col(first_), step.Y.col(second_), step.K.col(second_), step.h);
   if (pair_ != Pair::across_steps) return {};
   if (h_last_ > 0 && t_last_ == step.t) compare(Y_last_, K_last_, step.Y.col(0), step.K.col(0), h_last_);
-  Y_last_ = step.Y.col(second_), K_last_ = step.K.col(second_);
-  t_last_ = step.t1, h_last_ = step.h;
+  Y_last_ = step.Y.col(second_);
+  K_last_ = step.K.col(second_);
+  t_last_ = step.t1;
+  h_last_ = step.h;
   return {};
 }
 

@@ -118,7 +118,8 @@ class ContinuousComparison {
         ContinuousEntry e;
         e.objective = objectives_[static_cast<std::size_t>(i)].name();
         e.parameter = evaluator_.variable(k).name;
-        e.discrete = discrete(i, k), e.continuous = continuous(i, k);
+        e.discrete = discrete(i, k);
+        e.continuous = continuous(i, k);
         const double entry =
             std::max({std::abs(e.discrete), std::abs(e.continuous), options_.floor * largest / size(k)});
         const double apart = std::abs(e.continuous - e.discrete);

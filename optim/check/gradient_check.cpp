@@ -55,7 +55,8 @@ class Check {
     run_.on_frozen_steps = parameters_on_frozen_steps();
     differences_.emplace(run_,
                          GradientDifferences::Settings{options_.relative_step, options_.rungs, options_.free_steps});
-    rounding_.psi.setZero(result_.psi.size()), rounding_.psi_rho.setZero(result_.psi.size(), run_.rho.size());
+    rounding_.psi.setZero(result_.psi.size());
+    rounding_.psi_rho.setZero(result_.psi.size(), run_.rho.size());
     measure_times();
     difference();
     estimate_integration_error();
@@ -90,14 +91,17 @@ class Check {
     for (Evaluation* const e : {&tlm_, &adjoint_}) {
       const GradientMethod method = e == &tlm_ ? GradientMethod::tlm : GradientMethod::adjoint;
       *e = run_.counted(run_.evaluator.in(scene_, method).gradients(run_.rho));
-      result_.statistics = e->statistics, result_.warnings = e->warnings;
+      result_.statistics = e->statistics;
+      result_.warnings = e->warnings;
       if (!e->ok) {
         result_.message = e->message;
         return false;
       }
     }
-    result_.tlm = tlm_.psi_rho, result_.adjoint = adjoint_.psi_rho;
-    result_.psi = run_.psi = tlm_.psi = adjoint_.psi, run_.steps = adjoint_.steps;
+    result_.tlm = tlm_.psi_rho;
+    result_.adjoint = adjoint_.psi_rho;
+    result_.psi = run_.psi = tlm_.psi = adjoint_.psi;
+    run_.steps = adjoint_.steps;
     return true;
   }
 
@@ -150,7 +154,8 @@ class Check {
       }
       if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
     }
-    set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
+    set_ratio(result_.frozen_cost);
+    set_ratio(result_.free_cost);
   }
 
   // Repeats differences that disagree with smaller steps. Returns whether one of them changed.
@@ -270,15 +275,19 @@ class Check {
     result_.entries.clear();
     const CheckThresholds& limits = options_.thresholds;
     const GradientDifferences::Table &on_frozen = differences_->of(true), &on_free = differences_->of(false);
-    result_.frozen = on_frozen.derivative, result_.free = on_free.derivative;
+    result_.frozen = on_frozen.derivative;
+    result_.free = on_free.derivative;
     for (Index i = 0; i < result_.psi.size(); ++i) {
       for (Index k = 0; k < run_.rho.size(); ++k) {
         CheckedEntry e;
         e.objective = result_.objectives[static_cast<std::size_t>(i)];
         e.parameter = result_.parameters[static_cast<std::size_t>(k)];
-        e.tlm = result_.tlm(i, k), e.adjoint = result_.adjoint(i, k);
-        e.frozen = result_.frozen(i, k), e.frozen_error = on_frozen.error(i, k);
-        e.free = result_.free(i, k), e.free_error = on_free.error(i, k);
+        e.tlm = result_.tlm(i, k);
+        e.adjoint = result_.adjoint(i, k);
+        e.frozen = result_.frozen(i, k);
+        e.frozen_error = on_frozen.error(i, k);
+        e.free = result_.free(i, k);
+        e.free_error = on_free.error(i, k);
         const double entry = std::max(std::abs(e.tlm), std::abs(e.adjoint));
         const double floor = floor_of(i, k);
         // Differences carry the rounding of psi, divided by their step, too.
@@ -353,7 +362,8 @@ class Check {
       const VectorXd d = random_direction(run_.rho.size()).cwiseProduct(run_.size);
       const VectorXd w = random_direction(result_.psi.size());
       IdentityCheck check;
-      check.d = d, check.w = w;
+      check.d = d;
+      check.w = w;
       check.tlm = w.dot(result_.tlm * d);
       check.adjoint = (result_.adjoint.transpose() * w).dot(d);
       const double terms = w.cwiseAbs().dot(result_.tlm.cwiseAbs() * d.cwiseAbs());

@@ -143,7 +143,8 @@ double GradientDifferences::kink(Index i, Index k, bool frozen, double psi_round
     if (rung->first.first != k || plus.size() == 0 || minus.size() == 0) continue;
     const double bend = plus(i) + minus(i) - 2 * run_.psi(i);
     if (!(std::abs(bend) > kEstimateTrust * psi_rounding)) break;
-    wider = b, b = bend / (2 * rung->first.second);
+    wider = b;
+    b = bend / (2 * rung->first.second);
   }
   return b / wider > kKinkFalls ? b : kNaN;
 }

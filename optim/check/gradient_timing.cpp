@@ -32,7 +32,10 @@ GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& 
     timing.simulations += e.simulations;
     timing.ok = e.ok;
     if (!e.ok) timing.message = e.message;
-    if (!derivatives) timing.steps = e.statistics.steps, timing.rhs_evaluations = e.statistics.rhs_evaluations;
+    if (!derivatives) {
+      timing.steps = e.statistics.steps;
+      timing.rhs_evaluations = e.statistics.rhs_evaluations;
+    }
     return e.wall_seconds;
   };
   Rounds simulation, tlm, adjoint;
@@ -50,7 +53,9 @@ GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& 
     if (timing.ok) tlm.add(timed(GradientMethod::tlm), one);
     if (!timing.ok) return timing;
   }
-  timing.simulation = simulation.cost(), timing.adjoint = adjoint.cost(), timing.tlm = tlm.cost();
+  timing.simulation = simulation.cost();
+  timing.adjoint = adjoint.cost();
+  timing.tlm = tlm.cost();
   return timing;
 }
 

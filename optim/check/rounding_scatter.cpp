@@ -23,7 +23,9 @@ Scene with_numbers_changed(Scene scene, double largest, unsigned seed) {
   };
   for (Body& body : scene.bodies) {
     body.mass = changed(body.mass);
-    nudge(body.position), nudge(body.velocity), nudge(body.angular_velocity);
+    nudge(body.position);
+    nudge(body.velocity);
+    nudge(body.angular_velocity);
     for (auto& [name, point] : body.points) nudge(point);
   }
   for (Joint& joint : scene.joints)

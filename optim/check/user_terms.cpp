@@ -53,15 +53,20 @@ std::vector<Direction> directions(const VectorXd& q, const VectorXd& v, const st
     const Vector4d p = q.segment<4>(at + 3), pdot = v.segment<4>(at + 3);
     for (int axis = 0; axis < 3; ++axis) {
       Direction d{VectorXd::Zero(q.size()), VectorXd::Zero(q.size()), false, false, ""};
-      d.q(at + axis) = 1, d.name = fmt::format("{} of '{}'", kAxes[axis], body);
+      d.q(at + axis) = 1;
+      d.name = fmt::format("{} of '{}'", kAxes[axis], body);
       all.push_back(d);
-      d.q(at + axis) = 0, d.v(at + axis) = 1, d.of_rates = true, d.name = fmt::format("the rate of {}", d.name);
+      d.q(at + axis) = 0;
+      d.v(at + axis) = 1;
+      d.of_rates = true;
+      d.name = fmt::format("the rate of {}", d.name);
       all.push_back(d);
       d.v(at + axis) = 0, d.v.segment<4>(at + 3) = turned(p, axis), d.turns = true;
       d.name = fmt::format("the angular velocity of '{}' about its {}", body, kAxes[axis]);
       all.push_back(d);
       d.q.segment<4>(at + 3) = turned(p, axis), d.v.segment<4>(at + 3) = -d.q.segment<4>(at + 3).dot(pdot) * p;
-      d.of_rates = false, d.name = fmt::format("a turn of '{}' about its {}", body, kAxes[axis]);
+      d.of_rates = false;
+      d.name = fmt::format("a turn of '{}' about its {}", body, kAxes[axis]);
       all.push_back(d);
     }
   }
@@ -185,7 +190,9 @@ class UserTerms {
       return value;
     };
     MatrixXd K = MatrixXd::Zero(size, size), C = K, Q_rho = MatrixXd::Zero(size, rho_.size());
-    force.K(t, q, v, rho_, K), force.C(t, q, v, rho_, C), force.Q_rho(t, q, v, rho_, Q_rho);
+    force.K(t, q, v, rho_, K);
+    force.C(t, q, v, rho_, C);
+    force.Q_rho(t, q, v, rho_, Q_rho);
     compare_all({name + "K = -dQ/dq", name + "C = -dQ/dv", name + "Q_rho", Q}, t, q, v, bodies, -K, -C, Q_rho);
     if (force.inertia()) check_inertia(index, name, t, q, v, bodies);
   }
@@ -206,7 +213,10 @@ class UserTerms {
     };
     const InertialLoad& load = load_of(mechanism_);
     MatrixXd M = MatrixXd::Zero(6, 6), L_q = MatrixXd::Zero(6, 7), L_v = L_q, L_rho = MatrixXd::Zero(6, rho_.size());
-    load.M(q, rho_, M), load.L_q(q, v, z, rho_, L_q), load.L_v(q, v, z, rho_, L_v), load.L_rho(q, v, z, rho_, L_rho);
+    load.M(q, rho_, M);
+    load.L_q(q, v, z, rho_, L_q);
+    load.L_v(q, v, z, rho_, L_v);
+    load.L_rho(q, v, z, rho_, L_rho);
     for (Index k = 0; k < 6; ++k)
       compare(
           name + "M = -dL/dz", fmt::format("acceleration {}", k), t, kLargest * (k < 3 ? length_ : 1),

@@ -84,7 +84,8 @@ void describe_objective(const DesignProgram& program, const std::vector<std::opt
     const std::optional<double>& true_value = true_values[static_cast<std::size_t>(c * stride)];
     if (!result.cases.empty()) {
       DesignCase& of_case = result.cases[static_cast<std::size_t>(c)];
-      of_case.value = values(c), of_case.true_value = true_value;
+      of_case.value = values(c);
+      of_case.true_value = true_value;
     }
     smooth = smooth || true_value;
     values(c) = true_value.value_or(values(c));
@@ -164,7 +165,9 @@ void describe_start(const DesignProgram& program, const Evaluation& start, Desig
   for (Eigen::Index i = 0; i < program.constraints(); ++i) {
     const ObjectiveBound& bound = program.bound(i);
     DesignConstraint& constraint = result.constraints.emplace_back();
-    constraint.objective = bound.objective, constraint.lower = bound.lower, constraint.upper = bound.upper;
+    constraint.objective = bound.objective;
+    constraint.lower = bound.lower;
+    constraint.upper = bound.upper;
     constraint.initial = constraint.value = start.ok ? start.psi(program.psi_of(i)) : 0;
     constraint.load_case =
         program.evaluator().case_name(static_cast<std::size_t>(i) / program.spec().subject_to.size());
@@ -180,7 +183,8 @@ void describe_end(const DesignProgram& program, const NlpResult& solution, Desig
     v.value = result.rho(program.evaluator().variables()[k]);
     const double width = v.lower && v.upper ? *v.upper - *v.lower : INFINITY;
     const double size = std::min(width, kWide * rho_x(static_cast<Eigen::Index>(k)));
-    v.at_lower = touches(v.value, v.lower, size), v.at_upper = touches(v.value, v.upper, size);
+    v.at_lower = touches(v.value, v.lower, size);
+    v.at_upper = touches(v.value, v.upper, size);
   }
   result.objective_final = end.f;
   result.violation = result.true_violation = program.violation(end.c);
@@ -208,7 +212,8 @@ void describe_solution(DesignProgram& program, const LimitedSolution& rounds, De
         std::max(result.true_violation, c.true_violation / program.size(static_cast<Eigen::Index>(i)));
   }
   NlpPoint end;
-  end.f_x.setZero(program.variables()), end.c.setZero(program.constraints());
+  end.f_x.setZero(program.variables());
+  end.c.setZero(program.constraints());
   end.c_x.setZero(program.constraints(), program.variables());
   program.evaluate(x, end);
   if (!end.ok) return;
@@ -221,7 +226,8 @@ void describe_solution(DesignProgram& program, const LimitedSolution& rounds, De
         found.multipliers(row) * program.c_scale(row) / (program.f_scale * program.size(row) * rounds.slopes(row));
     const bool equality = is_equality(c), binds = found.binds(row, program.spec().optimizer.tolerance);
     c.price = equality ? fall : binds ? std::abs(fall) : 0;
-    c.at_lower = c.at_lower || (binds && fall < 0), c.at_upper = c.at_upper || (binds && fall > 0);
+    c.at_lower = c.at_lower || (binds && fall < 0);
+    c.at_upper = c.at_upper || (binds && fall > 0);
   }
   if (result.status == SolverStatus::infeasible) describe_conflict(program, x, end, result);
 }

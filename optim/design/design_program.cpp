@@ -30,7 +30,9 @@ double inverse(double x) { return x > 0 && std::isfinite(x) ? 1 / x : 1; }
 // of a length.
 HessianOptions for_steps() {
   HessianOptions options;
-  options.relative_step = 1e-5, options.rungs = 8, options.enough = 1e-4;
+  options.relative_step = 1e-5;
+  options.rungs = 8;
+  options.enough = 1e-4;
   return options;
 }
 
@@ -65,7 +67,9 @@ Problem with_named_means(Problem problem) {
 
 EvaluatorOptions evaluator_options(const DesignOptions& options) {
   EvaluatorOptions result;
-  result.method = options.method, result.user_forces = options.user_forces, result.threads = options.threads;
+  result.method = options.method;
+  result.user_forces = options.user_forces;
+  result.threads = options.threads;
   result.progress = options.simulation_progress;
   return result;
 }
@@ -88,11 +92,15 @@ DesignProgram::DesignProgram(const Problem& problem, const DesignOptions& option
       bounds_(static_cast<Index>(spec_.subject_to.size())),
       abandoned_(std::move(abandoned)),
       gauss_newton_(spec_.optimizer.hessian == "gauss_newton") {
-  x_lower = scaling_.x_lower(), x_upper = scaling_.x_upper();
+  x_lower = scaling_.x_lower();
+  x_upper = scaling_.x_upper();
   if (!spec_.sharpness) spec_.sharpness = sharpness();
   objective_ = CaseObjective(problem_.cases, spec_);
   const Index m = bounds_ * static_cast<Index>(evaluator_.cases());
-  c_lower.setConstant(m, -kInfinity), c_upper.setConstant(m, kInfinity), c_scale.setOnes(m), size_.setOnes(m);
+  c_lower.setConstant(m, -kInfinity);
+  c_upper.setConstant(m, kInfinity);
+  c_scale.setOnes(m);
+  size_.setOnes(m);
   for (Index i = 0; i < m; ++i) {
     const double size = std::max(std::abs(bound(i).lower.value_or(0)), std::abs(bound(i).upper.value_or(0)));
     if (size > 0) size_(i) = size;
@@ -182,7 +190,9 @@ NlpScale DesignProgram::scale_at(const VectorXd& x_start) {
   VectorXd c_size = VectorXd::Zero(constraints());
   for (const VectorXd& x : {inward, x_start}) {  // the start last: it is kept
     NlpPoint point;
-    point.f_x.setZero(variables()), point.c.setZero(constraints()), point.c_x.setZero(constraints(), variables());
+    point.f_x.setZero(variables());
+    point.c.setZero(constraints());
+    point.c_x.setZero(constraints(), variables());
     evaluate(x, point);
     if (!point.ok) continue;
     f_size = std::max({f_size, std::abs(point.f), point.f_x.cwiseAbs().maxCoeff()});
@@ -193,10 +203,14 @@ NlpScale DesignProgram::scale_at(const VectorXd& x_start) {
 
 Evaluation DesignProgram::start_from(const VectorXd& x_start, const std::optional<NlpScale>& given) {
   const NlpScale scale = given ? *given : scale_at(x_start);
-  f_scale = scale.f, c_scale = scale.c;
+  f_scale = scale.f;
+  c_scale = scale.c;
   const Evaluation start = evaluator_.gradients(rho_at(x_start));  // in memory, unless the scale is given
-  if (start.ok)
-    best_ = start, best_f_ = objective_.value(minimised(start.psi)), best_violations_ = violations_of(start);
+  if (start.ok) {
+    best_ = start;
+    best_f_ = objective_.value(minimised(start.psi));
+    best_violations_ = violations_of(start);
+  }
   return start;
 }
 
@@ -222,7 +236,8 @@ VectorXd DesignProgram::rho_at(const VectorXd& x) const {
 // Into the point: values, and derivatives where it has room for them. Keeps the evaluation if it is the best.
 void DesignProgram::fill(const Evaluation& e, const VectorXd& x, NlpPoint& point) {
   if (!e.ok) {
-    point.ok = false, point.message = e.message;
+    point.ok = false;
+    point.message = e.message;
     point.abandoned = abandoned_ && abandoned_();
     return;
   }
@@ -236,7 +251,9 @@ void DesignProgram::fill(const Evaluation& e, const VectorXd& x, NlpPoint& point
   }
   const double violations = violations_of(e);
   if (best_.ok && !is_better(point.f, violations, best_f_, best_violations_)) return;
-  best_ = e, best_f_ = point.f, best_violations_ = violations;
+  best_ = e;
+  best_f_ = point.f;
+  best_violations_ = violations;
 }
 
 void DesignProgram::evaluate(const VectorXd& x, NlpPoint& point) { fill(evaluation(rho_at(x)), x, point); }

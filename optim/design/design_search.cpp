@@ -30,7 +30,8 @@ DifferenceComparison comparison_at(const Evaluation& start, const Evaluator& eva
   for (const Objective& objective : evaluator.objectives())
     comparison.groups.push_back(
         {"objective '" + objective.name() + "'", static_cast<Eigen::Index>(comparison.groups.size()), 1});
-  comparison.f = start.psi, comparison.f_rho = start.psi_rho;
+  comparison.f = start.psi;
+  comparison.f_rho = start.psi_rho;
   // One evaluator for all differences, which keeps its last point: threads stays 1.
   comparison.at = [&start, there = evaluator](std::size_t k, double h) mutable -> std::optional<Eigen::VectorXd> {
     Eigen::VectorXd rho = start.rho;

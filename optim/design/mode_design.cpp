@@ -29,9 +29,11 @@ bool may_improve(const DesignSpec& spec, const DesignResult& result) {
 // Adds the work of an earlier search, and starts where that one did.
 void begin_with(const DesignResult& earlier, DesignResult& result) {
   result.objective_initial = earlier.objective_initial;
-  result.iterations += earlier.iterations, result.evaluations += earlier.evaluations;
+  result.iterations += earlier.iterations;
+  result.evaluations += earlier.evaluations;
   result.failed_evaluations += earlier.failed_evaluations;
-  result.simulations += earlier.simulations, result.wall_seconds += earlier.wall_seconds;
+  result.simulations += earlier.simulations;
+  result.wall_seconds += earlier.wall_seconds;
   for (std::size_t v = 0; v < result.variables.size(); ++v) result.variables[v].initial = earlier.variables[v].initial;
   for (std::size_t c = 0; c < result.constraints.size(); ++c)
     result.constraints[c].initial = earlier.constraints[c].initial;
@@ -80,12 +82,15 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
     begin_with(result, more);
     if (!is_better) {
       result.take_counts(more);
-      result.simulations = more.simulations, result.wall_seconds = more.wall_seconds;
+      result.simulations = more.simulations;
+      result.wall_seconds = more.wall_seconds;
       if (more.status == SolverStatus::stopped) result.end(more.status, more.message);
       break;
     }
     more.history = joined_histories(std::move(result.history), std::move(more.history));
-    result = std::move(more), problem = *std::move(next), moved = true;
+    result = std::move(more);
+    problem = *std::move(next);
+    moved = true;
   }
   return moved;
 }
@@ -93,7 +98,8 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
 // The start of a design that was not begun.
 DesignResult not_begun(const Problem& problem) {
   DesignResult none;
-  none.objective = problem.design->minimize, none.optimizer = problem.design->optimizer.type;
+  none.objective = problem.design->minimize;
+  none.optimizer = problem.design->optimizer.type;
   for (const std::string& name : problem.design->variables) {
     const Parameter& p = *std::ranges::find(problem.scene.parameters, name, &Parameter::name);
     none.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});

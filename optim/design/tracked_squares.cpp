@@ -57,14 +57,18 @@ TrackedSquares::TrackedSquares(const DesignProgram& program)
       program_(program),
       evaluator_(program.evaluator()),
       residuals_(size - program.constraints()) {
-  x_lower = program.x_lower, x_upper = program.x_upper;
+  x_lower = program.x_lower;
+  x_upper = program.x_upper;
 }
 
 void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
   simulate(x, point);
   is_integrated = !is_solved_;
   if (abandoned_) return;
-  if (point.ok && !(point.z.allFinite() && point.z_x.allFinite())) point.ok = false, point.message = kNoValue;
+  if (point.ok && !(point.z.allFinite() && point.z_x.allFinite())) {
+    point.ok = false;
+    point.message = kNoValue;
+  }
   without_value_ = without_value_ || point.message == kNoValue;
 }
 
@@ -77,7 +81,8 @@ SimulationResult TrackedSquares::with_tangents(const Mechanism& mechanism, const
     const Assembly start(mechanism, settings.start_time, modes_);
     if (!start.result().ok) {
       SimulationResult failed;
-      failed.status = SimulationStatus::assembly_failed, failed.message = start.result().message;
+      failed.status = SimulationStatus::assembly_failed;
+      failed.message = start.result().message;
       return failed;
     }
     if (is_solved(mechanism, settings, start)) {
@@ -128,13 +133,15 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     for (const Taken& t : taken) {
       std::shared_ptr<const PointCost>& cost = bound[t.value->id()];
       if (!cost) cost = t.value->bind(mechanism);
-      costs.push_back(cost.get()), sampling.times.push_back(t.time);
+      costs.push_back(cost.get());
+      sampling.times.push_back(t.time);
     }
     const Index half = mechanism.states() / 2;
     VectorXd y_bar(mechanism.states()), rho_bar(rho.size()), z_t(static_cast<Index>(rows.size()));
     bool reads_velocities = false;
     sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
-      y_bar.setZero(), rho_bar.setZero();
+      y_bar.setZero();
+      rho_bar.setZero();
       const auto& [time, value, row, factor] = taken[k];
       point.z(row) += factor * costs[k]->add_gradient(at, 1, y_bar, rho_bar);
       reads_velocities = reads_velocities || y_bar.tail(half).any();
@@ -147,12 +154,14 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     ++simulations_;
     const SimulationResult run = with_tangents(mechanism, evaluator.scene().simulation, sampling, {nullptr, go_on});
     if (!run.ok()) {
-      point.ok = false, point.message = run.message;
+      point.ok = false;
+      point.message = run.message;
       return;
     }
     if (reads_velocities && !reads_velocities_) {  // with their derivatives
       reads_velocities_ = true;
-      point.z.setZero(), point.z_x.setZero();
+      point.z.setZero();
+      point.z_x.setZero();
       return simulate(x, point);
     }
     project_free_instants(objective, instants, first, z_t, point.z_x);
@@ -172,7 +181,10 @@ NlpResult solve_tracked_squares(DesignProgram& program, const VectorXd& x_start,
     return !problem.abandoned() && (!progress || progress({p.iteration, 2 * p.cost, 0, kUnknown, p.x}));
   };
   LeastSquaresResult found = solve_within_limits(problem, program.c_lower, program.c_upper, x_start, options);
-  if (problem.abandoned()) --found.evaluations, --found.failed_evaluations;
+  if (problem.abandoned()) {
+    --found.evaluations;
+    --found.failed_evaluations;
+  }
   if (found.status == SolverStatus::converged && problem.without_value() && found.promised > kSimulationNoise) {
     found.status = SolverStatus::no_progress;
     found.message =
@@ -185,7 +197,8 @@ NlpResult solve_tracked_squares(DesignProgram& program, const VectorXd& x_start,
                                                : "Levenberg-Marquardt within bounds";
   simulations += problem.simulations();
   NlpPoint& point = result.point;
-  point.c.setZero(program.constraints()), point.c_x.setZero(program.constraints(), program.variables());
+  point.c.setZero(program.constraints());
+  point.c_x.setZero(program.constraints(), program.variables());
   point.ok = found.point.z.size() == problem.size;  // not where the start could not be evaluated
   if (!point.ok) {
     point.message = found.message;
@@ -194,7 +207,8 @@ NlpResult solve_tracked_squares(DesignProgram& program, const VectorXd& x_start,
   const Index squares = problem.residuals();
   point.f = found.point.z.head(squares).squaredNorm();
   point.f_x = 2 * found.point.z_x.topRows(squares).transpose() * found.point.z.head(squares);
-  point.c = found.point.z.tail(program.constraints()), point.c_x = found.point.z_x.bottomRows(program.constraints());
+  point.c = found.point.z.tail(program.constraints());
+  point.c_x = found.point.z_x.bottomRows(program.constraints());
   return result;
 }
 

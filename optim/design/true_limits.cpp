@@ -43,7 +43,8 @@ bool TrueLimits::is_settled(const Limit& l, double psi, double X, int side) {
 void TrueLimits::learn(Limit& l, double psi, double X) {
   if (l.psi && std::abs(psi - *l.psi) > kNoChange * l.size)
     l.slope = std::clamp((X - *l.X) / (psi - *l.psi), kLeastSlope, kLargestSlope);
-  l.psi = psi, l.X = X;
+  l.psi = psi;
+  l.X = X;
 }
 
 void TrueLimits::move(Limit& l, double psi, double X) {
@@ -71,9 +72,13 @@ bool TrueLimits::move(DesignProgram& program, const Eigen::VectorXd& c,
     if (!released && is_settled(l, value, *X, side)) continue;
     moved = true;
     if (rounds_ == kRounds) continue;
-    if (released) l.held = 0, l.may_be_held = false;
+    if (released) {
+      l.held = 0;
+      l.may_be_held = false;
+    }
     if (l.may_be_held && side != 0) l.held = side;
-    move(l, value, *X), set_bounds(l, l.held, program);
+    move(l, value, *X);
+    set_bounds(l, l.held, program);
   }
   if (!moved || rounds_ == kRounds) return false;
   ++rounds_;

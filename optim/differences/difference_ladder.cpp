@@ -21,7 +21,9 @@ LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, do
   LadderDerivative best;
   best.derivative.setZero(size);
   best.error.setConstant(size, kUnbounded);
-  best.rounding.setZero(size), best.step.setZero(size), best.largest.setZero(size);
+  best.rounding.setZero(size);
+  best.step.setZero(size);
+  best.largest.setZero(size);
   std::vector<Eigen::VectorXd> above, row;  // rows j - 1 and j of T
   double h = options.step;
   for (int j = 0; j < options.rungs; ++j, h /= 2) {
@@ -44,8 +46,10 @@ LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, do
                    : std::max(std::abs(row[k](i) - row[k - 1](i)), std::abs(row[k](i) - above[k - 1](i)));
         const double error = std::max(spread, rounding(i));
         if (!(error < best.error(i))) continue;
-        best.error(i) = error, best.derivative(i) = row[k](i);
-        best.rounding(i) = rounding(i), best.step(i) = std::abs(h);
+        best.error(i) = error;
+        best.derivative(i) = row[k](i);
+        best.rounding(i) = rounding(i);
+        best.step(i) = std::abs(h);
         best.largest(i) = std::ldexp(std::abs(h), static_cast<int>(k));
       }
     }
@@ -60,8 +64,11 @@ LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, do
 void LadderDerivative::take_better(const LadderDerivative& other) {
   for (Eigen::Index i = 0; i < error.size(); ++i) {
     if (!(other.error(i) < error(i))) continue;
-    derivative(i) = other.derivative(i), error(i) = other.error(i), rounding(i) = other.rounding(i);
-    step(i) = other.step(i), largest(i) = other.largest(i);
+    derivative(i) = other.derivative(i);
+    error(i) = other.error(i);
+    rounding(i) = other.rounding(i);
+    step(i) = other.step(i);
+    largest(i) = other.largest(i);
   }
 }
 

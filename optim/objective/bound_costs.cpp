@@ -59,8 +59,10 @@ class BoundCost final : public RunningCost, public TerminalCost {
     const VectorXd part = state(y);
     VectorXd of_state = VectorXd::Zero(part.size()), of_p = VectorXd::Zero(static_cast<Index>(parameters_.size()));
     terminal_->adjoint_init(part, parameters(rho), of_state, of_p);
-    lambda.setZero(), mu.setZero();
-    add_state(of_state, lambda), add_rho(rho, of_p, mu);
+    lambda.setZero();
+    mu.setZero();
+    add_state(of_state, lambda);
+    add_rho(rho, of_p, mu);
   }
 
  private:

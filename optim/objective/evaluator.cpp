@@ -86,9 +86,12 @@ Evaluator::Evaluator(const Problem& problem, std::vector<Evaluator> cases) : Eva
 
 Evaluator Evaluator::in(Scene scene, GradientMethod method) const {
   Evaluator other = *this;
-  other.scene_ = std::move(scene), other.programs_ = std::make_shared<ScenePrograms>(other.scene_);
+  other.scene_ = std::move(scene);
+  other.programs_ = std::make_shared<ScenePrograms>(other.scene_);
   other.options_.method = method;
-  other.has_differentiated_ = false, other.last_ = {}, other.simulations_ = 0;
+  other.has_differentiated_ = false;
+  other.last_ = {};
+  other.simulations_ = 0;
   return other;
 }
 
@@ -145,11 +148,15 @@ Evaluation Evaluator::in_cases(const Eigen::VectorXd& rho, Evaluation (Evaluator
   const Eigen::Index n = static_cast<Eigen::Index>(objectives_.size()), rows = n * static_cast<Eigen::Index>(cases());
   Evaluation all = found[0];
   all.rho = rho;
-  all.psi.setZero(rows), all.psi_rho.setZero(all.has_gradients() ? rows : 0, all.psi_rho.cols());
-  all.simulations = 0, all.wall_seconds = 0, all.warnings.clear();
+  all.psi.setZero(rows);
+  all.psi_rho.setZero(all.has_gradients() ? rows : 0, all.psi_rho.cols());
+  all.simulations = 0;
+  all.wall_seconds = 0;
+  all.warnings.clear();
   for (std::size_t c = 0; c < cases(); ++c) {
     const Evaluation& e = found[c];
-    all.simulations += e.simulations, all.wall_seconds += e.wall_seconds;
+    all.simulations += e.simulations;
+    all.wall_seconds += e.wall_seconds;
     for (const std::string& warning : e.warnings) all.warnings.push_back(with_case(c, warning));
     if (!e.ok) {
       if (all.ok || c == 0) all.message = with_case(c, e.message);
@@ -172,7 +179,10 @@ void Evaluator::find_unused() {
     if (!o.is_written_in_cpp()) judged.objectives.push_back(o.spec());
   bool opaque = judged.objectives.size() < objectives_.size() || !options_.user_forces.empty();
   for (Force& force : judged.scene.forces) {
-    if (auto* const user = std::get_if<UserForceSpec>(&force.kind)) opaque = true, user->parameters.clear();
+    if (auto* const user = std::get_if<UserForceSpec>(&force.kind)) {
+      opaque = true;
+      user->parameters.clear();
+    }
   }
   std::vector<SceneIssue> unused = find_unused_parameters(judged);
   if (opaque) {  // may look at every body

@@ -29,7 +29,10 @@ struct Scratch {
 
   void grow(const Program& p, int inputs) {
     const std::size_t n = static_cast<std::size_t>(inputs);
-    if (x.size() < n) x.resize(n), gradient.resize(n);
+    if (x.size() < n) {
+      x.resize(n);
+      gradient.resize(n);
+    }
     p.grow(program);
   }
 };
@@ -152,7 +155,8 @@ SecondOrder CostExpression::second_order(const Mechanism& mechanism, const State
   }
   Eigen::VectorXd y_bar(y_rho.rows()), rho_bar(mechanism.rho().size());
   for (const auto& [input, sensor] : compiled_->sensors) {
-    y_bar.setZero(), rho_bar.setZero();
+    y_bar.setZero();
+    rho_bar.setZero();
     u(input) = mechanism.add_sensor_gradient(sensor, at, 1, y_bar, rho_bar);
     for (Eigen::Index j = 0; j < n; ++j) {
       const int k = variables[static_cast<std::size_t>(j)];
@@ -168,8 +172,10 @@ SecondOrder CostExpression::second_order(const Mechanism& mechanism, const State
   SecondOrder result{program.value(span_of(u), scratch), Eigen::VectorXd::Zero(n), {}};
   for (const int i : program.used_inputs()) {
     if (i == compiled_->time) continue;
-    direction.setZero(), direction(i) = 1;
-    e_u.setZero(u.size()), e_uj.setZero(u.size());
+    direction.setZero();
+    direction(i) = 1;
+    e_u.setZero(u.size());
+    e_uj.setZero(u.size());
     program.add_gradient_tangent(span_of(u), span_of(direction), 1, span_of(e_u), span_of(e_uj), scratch);
     e_uu.col(i) = e_uj;
     result.first += e_u(i) * U.row(i).transpose();

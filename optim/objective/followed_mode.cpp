@@ -85,7 +85,10 @@ Index FollowedMode::mode_of(const State& state, const UserForces& forces) const 
   double most = -1;
   for (Index k = 0; k < state.x.eigenvalues.size(); ++k) {
     const double alike = std::abs(reference_->shape.dot(state.shape(k)));
-    if (state.x.eigenvalues(k).imag() >= 0 && alike > most) most = alike, best = k;
+    if (state.x.eigenvalues(k).imag() >= 0 && alike > most) {
+      most = alike;
+      best = k;
+    }
   }
   return best;
 }
@@ -156,7 +159,8 @@ double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces,
     VectorXd out = VectorXd::Zero(2 * (states + P)), theta(d.slots()), of_rho(P);
     for (const int part : {0, 1}) {
       const VectorXd cotangent = part == 0 ? VectorXd(w_in_y.real()) : VectorXd(w_in_y.imag());
-      theta.setZero(), of_rho.setZero();
+      theta.setZero();
+      of_rho.setZero();
       dynamics.add_adjoint(cotangent, out.segment(part * (states + P), states), theta, of_rho);
       d.add_to_rho(theta, of_rho);
       out.segment(part * (states + P) + states, P) = of_rho;

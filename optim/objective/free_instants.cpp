@@ -54,14 +54,20 @@ Columns columns_in_order(const MatrixXd& D, Index first) {
   Eigen::MatrixXi at(D.rows(), D.cols());
   for (Index k = 0; k < D.rows(); ++k) {
     for (Index i = 0; i < D.cols(); ++i) {
-      least(k, i) = D((first + k) % D.rows(), i) + (k > 0 ? least(k - 1, i) : 0), at(k, i) = static_cast<int>(i);
-      if (i > 0 && least(k, i - 1) <= least(k, i)) least(k, i) = least(k, i - 1), at(k, i) = at(k, i - 1);
+      least(k, i) = D((first + k) % D.rows(), i) + (k > 0 ? least(k - 1, i) : 0);
+      at(k, i) = static_cast<int>(i);
+      if (i > 0 && least(k, i - 1) <= least(k, i)) {
+        least(k, i) = least(k, i - 1);
+        at(k, i) = at(k, i - 1);
+      }
     }
   }
   Columns found{least(D.rows() - 1, D.cols() - 1), std::vector<std::size_t>(static_cast<std::size_t>(D.rows()))};
   Index column = D.cols() - 1;
-  for (Index k = D.rows() - 1; k >= 0; --k)
-    column = at(k, column), found.of_points[static_cast<std::size_t>(k)] = static_cast<std::size_t>(column);
+  for (Index k = D.rows() - 1; k >= 0; --k) {
+    column = at(k, column);
+    found.of_points[static_cast<std::size_t>(k)] = static_cast<std::size_t>(column);
+  }
   return found;
 }
 
@@ -105,7 +111,8 @@ struct FreeInstants::Scan {
       for (const Coordinate& c : free.points_[p].coordinates) {
         const Moving s = channels(c.channel);
         const double w = weights(static_cast<Index>(c.channel)), off = s.value - c.target;
-        sum.value += 0.5 * w * off * off, sum.rate += w * off * s.rate;
+        sum.value += 0.5 * w * off * off;
+        sum.rate += w * off * s.rate;
       }
     }
     return sum;
@@ -186,7 +193,10 @@ struct FreeInstants::Scan {
     std::size_t first = 0;
     for (std::size_t start = 0; start < (is_closed() ? rows.size() : 1); ++start) {
       Columns other = columns_in_order(D, static_cast<Index>(start));
-      if (other.sum < nodes.sum) nodes = std::move(other), first = start;
+      if (other.sum < nodes.sum) {
+        nodes = std::move(other);
+        first = start;
+      }
     }
     std::vector<Block> blocks;
     for (std::size_t k = 0; k < nodes.of_points.size(); ++k) {
@@ -204,7 +214,8 @@ struct FreeInstants::Scan {
 };
 
 FreeInstants::FreeInstants(const SimulationSettings& settings) {
-  settings_.start_time = settings.start_time, settings_.end_time = settings.end_time;
+  settings_.start_time = settings.start_time;
+  settings_.end_time = settings.end_time;
   settings_.output_step = settings.output_step;
   settings_.solve = Solve::kinematics;
 }
@@ -231,13 +242,16 @@ FreeInstants::Motion FreeInstants::motion_at(const Mechanism& mechanism, const s
   const Index n = static_cast<Index>(channels_.size()), half = mechanism.states() / 2;
   Motion motion{times, MatrixXd(n, times.size()), MatrixXd(n, times.size()), VectorXd(n)};
   std::vector<std::shared_ptr<const PointCost>> sensors, weights;
-  for (const Channel& channel : channels_)
-    sensors.push_back(channel.sensor.bind(mechanism)), weights.push_back(channel.weight.bind(mechanism));
+  for (const Channel& channel : channels_) {
+    sensors.push_back(channel.sensor.bind(mechanism));
+    weights.push_back(channel.weight.bind(mechanism));
+  }
   VectorXd y_bar(mechanism.states()), rho_bar(mechanism.rho().size());
   Sampling sampling{times, [&](std::size_t index, const StatePoint& at) {
                       const Index i = static_cast<Index>(index);
                       for (Index c = 0; c < n; ++c) {
-                        y_bar.setZero(), rho_bar.setZero();
+                        y_bar.setZero();
+                        rho_bar.setZero();
                         motion.s(c, i) = sensors[static_cast<std::size_t>(c)]->add_gradient(at, 1, y_bar, rho_bar);
                         motion.s_t(c, i) = y_bar.head(half).dot(at.y.tail(half));
                         if (i == 0) motion.weights(c) = weights[static_cast<std::size_t>(c)]->value(at);
@@ -286,7 +300,8 @@ std::vector<FreeInstants::Instant> FreeInstants::nearest(const Mechanism& mechan
       Block& b = *moving[i];
       const double rate = scan.at(b.points, motion, i).rate;
       if (k > 0 && b.tau != b.earlier) b.curvature = (rate - b.earlier_rate) / (b.tau - b.earlier);
-      b.earlier = b.tau, b.earlier_rate = rate;
+      b.earlier = b.tau;
+      b.earlier_rate = rate;
       (rate < 0 ? b.from : b.to) = b.tau;
       b.tau -= rate / b.curvature;
       const double settled = kSettled * scan.step();  // a minimum at a node may lie so far beyond the bracket

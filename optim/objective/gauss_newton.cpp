@@ -21,7 +21,8 @@ class Gathered {
  public:
   Gathered(const Objective& objective, const ObjectivePart& part, Index variables)
       : objective_(objective), part_(part) {
-    I_rho_.setZero(variables), I_rhorho_.setZero(variables, variables);
+    I_rho_.setZero(variables);
+    I_rhorho_.setZero(variables, variables);
   }
 
   void add_running(double weight, const SecondOrder& x) {
@@ -45,7 +46,9 @@ class Gathered {
     if (part_.side == 0) return 0;
     if (part_.side * x > part_.side * x0_) {
       const double factor = objective_.integrand(x0_ - x, part_).value;  // 0 at first
-      I_ *= factor, I_rho_ *= factor, I_rhorho_ *= factor;
+      I_ *= factor;
+      I_rho_ *= factor;
+      I_rhorho_ *= factor;
       x0_ = x;
     }
     return x0_;

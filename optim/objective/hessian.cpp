@@ -108,7 +108,8 @@ class GradientAlong {
       double above = p.upper ? (*p.upper - value) / std::abs(slope) : kInfinity;
       double below = p.lower ? (value - *p.lower) / std::abs(slope) : kInfinity;
       if (slope < 0) std::swap(above, below);
-      plus = std::min(plus, kInside * above), minus = std::min(minus, kInside * below);
+      plus = std::min(plus, kInside * above);
+      minus = std::min(minus, kInside * below);
     }
     const double least = std::min(plus, minus), most = std::max(plus, minus);
     if (least >= kNear * h) return {std::min(h, least), 0};
@@ -184,11 +185,13 @@ ObjectiveHessian symmetrised(const MatrixXd& raw, const MatrixXd& raw_error, con
   const MatrixXd error = raw_error.cwiseMax(raw_error.transpose()).cwiseMax(apart);
   const MatrixXd value = 0.5 * (raw + raw.transpose());
   if (value.size() > 0) {
-    H.largest_error = error.maxCoeff(), H.largest_entry = value.cwiseAbs().maxCoeff();
+    H.largest_error = error.maxCoeff();
+    H.largest_entry = value.cwiseAbs().maxCoeff();
     H.asymmetry = apart.maxCoeff();
   }
   const MatrixXd unit = (size * size.transpose()).cwiseInverse();
-  H.value = value.cwiseProduct(unit), H.error = error.cwiseProduct(unit);
+  H.value = value.cwiseProduct(unit);
+  H.error = error.cwiseProduct(unit);
   return H;
 }
 
@@ -257,7 +260,8 @@ HessianProducts hessian_products(Evaluator& evaluator, const VectorXd& rho, cons
     result.message = along.message();
     return result;
   }
-  result.product.setZero(m, n), result.error.setZero(m, n);
+  result.product.setZero(m, n);
+  result.error.setZero(m, n);
   result.ok = true;
   const VectorXd in_sizes = d.cwiseQuotient(along.sizes());
   const double longest = n > 0 ? in_sizes.cwiseAbs().maxCoeff() : 0;

@@ -19,7 +19,8 @@ double other_errors(const IntegratorSettings& given) { return given.rtol > 10 * 
 
 Scene with_errors_times(double factor, Scene scene, long steps) {
   IntegratorSettings& s = scene.simulation.integrator;
-  s.rtol *= factor, s.atol *= factor;
+  s.rtol *= factor;
+  s.atol *= factor;
   if (const Method* method = runge_kutta_method(s.type)) {
     const double ratio = std::pow(factor, 1.0 / method->order);
     if (s.max_step) *s.max_step *= ratio;
@@ -42,7 +43,8 @@ std::optional<Scene> with_other_tolerances(Scene scene, long steps) {
 IntegrationError integration_error(const Evaluator& evaluator, const Evaluation& at, GradientMethod method,
                                    bool fixed_steps) {
   IntegrationError error;
-  error.psi.setZero(at.psi.size()), error.psi_rho.setZero(at.psi_rho.rows(), at.psi_rho.cols());
+  error.psi.setZero(at.psi.size());
+  error.psi_rho.setZero(at.psi_rho.rows(), at.psi_rho.cols());
   const IntegratorSettings& given = evaluator.scene().simulation.integrator;
   if (given.step && !fixed_steps) return error;
   if (!given.step) error.psi_rho = given.rtol * at.psi_rho.cwiseAbs();

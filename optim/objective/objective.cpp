@@ -230,7 +230,9 @@ void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const st
   Eigen::VectorXd direction(rho.size()), gradient(rho.size()), slope(rho.size());
   const auto all = [](Eigen::VectorXd& x) { return std::span<double>(x.data(), static_cast<std::size_t>(x.size())); };
   for (std::size_t j = 0; j < variables.size(); ++j) {
-    direction.setZero(), gradient.setZero(), slope.setZero();
+    direction.setZero();
+    gradient.setZero();
+    slope.setZero();
     direction(variables[j]) = 1;
     parameters_only_->add_gradient_tangent(view(rho), all(direction), 1, all(gradient), all(slope), scratch);
     for (std::size_t i = 0; i < variables.size(); ++i)

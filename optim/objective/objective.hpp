@@ -54,8 +54,9 @@ class Objective {
   // Returns the cost of a part; absent parts stay absent. Throws the exceptions of instants_of().
   Cost cost(const Mechanism& mechanism, const ObjectivePart& part = {}, double x0 = 0,
             const Progress& progress = {}) const;
-  Derivatives of_integral(double I, const ObjectivePart& part = {}, double x0 = 0) const;  // its mean, without the factor
-  Derivatives integrand(double x, const ObjectivePart& part = {}) const;                   // M of objective_kinds.hpp
+  Derivatives of_integral(double I, const ObjectivePart& part = {},
+                          double x0 = 0) const;                           // its mean, without the factor
+  Derivatives integrand(double x, const ObjectivePart& part = {}) const;  // M of objective_kinds.hpp
   // The expression x of a kind that is no sum; null if it is the constant 0.
   std::shared_ptr<const PointCost> expression(const Mechanism& mechanism) const;
   // The parts, for second derivatives. `running` is the integrand, or the expression x of a kind that is no sum.

@@ -18,8 +18,12 @@ class Peak {
  public:
   void add(double t, double x) {
     largest_ = std::max(largest_, x);
-    t_[0] = t_[1], t_[1] = t_[2], t_[2] = t;
-    x_[0] = x_[1], x_[1] = x_[2], x_[2] = x;
+    t_[0] = t_[1];
+    t_[1] = t_[2];
+    t_[2] = t;
+    x_[0] = x_[1];
+    x_[1] = x_[2];
+    x_[2] = x;
     if (++count_ < 3 || x_[1] < x_[0] || x_[1] < x_[2]) return;
     // x = x1 + b s + c s^2,  s = t - t1
     const double s0 = t_[0] - t_[1], s2 = t_[2] - t_[1];
@@ -42,7 +46,8 @@ class Peak {
       for (const double t : {top.t0, (top.t0 + top.t1) / 2, top.t1, (top.t1 + top.t2) / 2, top.t2, top.t})
         times.push_back(t);
     }
-    tops_.clear(), count_ = 0;
+    tops_.clear();
+    count_ = 0;
   }
 
  private:

@@ -56,7 +56,8 @@ void name_bounded_means(Problem& problem) {
     const double size = std::max(std::abs(bound.lower.value_or(0)), std::abs(bound.upper.value_or(0)));
     if (objective.is_extreme())
       objective.sharpness = bound.sharpness.value_or(ObjectiveBound::kSharpness / (size > 0 ? size : 1));
-    bound.means = {}, bound.sharpness.reset();
+    bound.means = {};
+    bound.sharpness.reset();
     problem.objectives.push_back(std::move(objective));
   }
 }

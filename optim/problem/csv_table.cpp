@@ -221,7 +221,10 @@ class Reader {
     if (!is_number(text, value) || !std::isfinite(value)) refuse("is not a finite number");
     if (found == ',' && delimiter_ == ',')
       refuse("has a decimal comma, which needs a semicolon or a tab between cells");
-    if (found && decimal_ == 0) decimal_ = found, decimal_line_ = line_;
+    if (found && decimal_ == 0) {
+      decimal_ = found;
+      decimal_line_ = line_;
+    }
     if (found && decimal_ != found)
       refuse(fmt::format("has a decimal {}, line {} a decimal {}; a file has one of them", name_of(found),
                          decimal_line_, name_of(decimal_)));

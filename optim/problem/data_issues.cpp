@@ -140,7 +140,8 @@ class DataCheck {
                                                       experiment_.channels[c].column, data_.name, window()));
         continue;
       }
-      first = std::min(first, rows.front()), last = std::max(last, rows.back());
+      first = std::min(first, rows.front());
+      last = std::max(last, rows.back());
     }
     if (first == t.size() || !(t[last] > start_)) {
       const std::string span =

@@ -52,7 +52,8 @@ std::string in_names_of_problem(std::string words, const CaseSpec& load_case, co
 
 Problem problem_of(const Problem& problem, const CaseSpec& load_case) {
   Problem result = problem;
-  result.cases.clear(), result.identification.reset();
+  result.cases.clear();
+  result.identification.reset();
   Scene& scene = result.scene;
   for (Parameter& p : scene.parameters) p.name = name_in(load_case, p.name, problem.scene);
   for (const Definition& override : load_case.overrides)
@@ -61,7 +62,10 @@ Problem problem_of(const Problem& problem, const CaseSpec& load_case) {
     for (std::string& variable : result.design->variables) variable = name_in(load_case, variable, problem.scene);
   for (const DriveLaw& law : load_case.drives) {
     const auto drive = std::ranges::find(scene.drives, law.drive, &Drive::name);
-    if (drive != scene.drives.end()) drive->law = law.law, drive->samples = law.samples;
+    if (drive != scene.drives.end()) {
+      drive->law = law.law;
+      drive->samples = law.samples;
+    }
   }
   for (const SignalSamples& samples : load_case.signals) {
     const auto signal = std::ranges::find(scene.signals, samples.name, &Signal::name);

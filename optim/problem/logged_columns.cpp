@@ -89,7 +89,8 @@ CsvTable merged(const std::vector<CsvTable>& tables, const std::vector<std::stri
     const bool joins = !sorted.lines.empty() && t[row] - sorted.columns[0].back() <= rounding;
     if (!joins) {
       for (std::size_t c = 0; c < columns.size(); ++c) sorted.columns[c].push_back(all.columns[c][row]);
-      sorted.lines.push_back(all.lines[row]), sorted.file_of_row.push_back(all.file_of_row[row]);
+      sorted.lines.push_back(all.lines[row]);
+      sorted.file_of_row.push_back(all.file_of_row[row]);
       continue;
     }
     for (std::size_t c = 1; c < columns.size(); ++c) {
@@ -156,10 +157,12 @@ void read_curve(SampleColumn& samples, Interpolation how, bool missing, bool by_
     if (!words.empty()) read.push_back(words);
   samples.unit = values.unit;
   std::vector<double> x, y;
-  x.reserve(values.values.size()), y.reserve(values.values.size());
+  x.reserve(values.values.size());
+  y.reserve(values.values.size());
   for (std::size_t row = 0; row < values.values.size(); ++row) {
     if (std::isfinite(values.values[row])) {
-      x.push_back(by_row ? static_cast<double>(row) : times.values[row]), y.push_back(values.values[row]);
+      x.push_back(by_row ? static_cast<double>(row) : times.values[row]);
+      y.push_back(values.values[row]);
     } else if (!missing) {
       throw CsvError(
           fmt::format("{}: column '{}' has no number here; a law needs all of them", table.place(row), samples.column));

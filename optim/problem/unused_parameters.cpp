@@ -143,8 +143,13 @@ class Reach {
         for (const std::string& body : mentions->bodies) acting[body].push_back(mentions);
       }
     };
-    add(scene_.bodies), add(scene_.joints), add(scene_.drives), add(scene_.forces), add(scene_.conditions);
-    parameters_ = std::move(observed.parameters), bodies_ = std::move(observed.bodies);
+    add(scene_.bodies);
+    add(scene_.joints);
+    add(scene_.drives);
+    add(scene_.forces);
+    add(scene_.conditions);
+    parameters_ = std::move(observed.parameters);
+    bodies_ = std::move(observed.bodies);
     std::vector<std::string> found(bodies_.begin(), bodies_.end());
     while (!found.empty()) {
       const std::vector<std::shared_ptr<Mentions>> here = std::move(acting[found.back()]);
@@ -227,12 +232,14 @@ Problem as_designed(Problem problem) {
 }
 
 Problem as_identified(Problem problem) {
-  problem.objectives.clear(), problem.cases.clear();
+  problem.objectives.clear();
+  problem.cases.clear();
   return problem;
 }
 
 Problem without_measurements(Problem problem) {
-  problem.identification.reset(), problem.cases.clear();
+  problem.identification.reset();
+  problem.cases.clear();
   return problem;
 }
 
@@ -251,7 +258,8 @@ void add_idle(const std::vector<std::string>& variables, const Problem& judged_b
 
 // Whatever uses a parameter counts, also coefficients if no law replaces them.
 std::set<std::string> used_anywhere(Problem problem, bool with_laws) {
-  problem.objectives.clear(), problem.identification.reset();
+  problem.objectives.clear();
+  problem.identification.reset();
   for (Force& force : problem.scene.forces)
     std::visit(
         [&](auto& kind) {

@@ -64,14 +64,22 @@ bool is_scaled_by_range(const Parameter& p) {
 
 VariableScaling::VariableScaling(const std::vector<Parameter>& parameters, const Eigen::VectorXd& felt) {
   const Eigen::Index n = static_cast<Eigen::Index>(parameters.size());
-  x_lower_.setConstant(n, -kInfinity), x_upper_.setConstant(n, kInfinity);
-  rho_lower_.setConstant(n, -kInfinity), rho_upper_.setConstant(n, kInfinity);
+  x_lower_.setConstant(n, -kInfinity);
+  x_upper_.setConstant(n, kInfinity);
+  rho_lower_.setConstant(n, -kInfinity);
+  rho_upper_.setConstant(n, kInfinity);
   for (Eigen::Index k = 0; k < n; ++k) {
     const Parameter& p = parameters[static_cast<std::size_t>(k)];
     check(p);
     const Variable variable{p.scale, linear_scale(p, felt.size() > 0 ? felt(k) : kInfinity)};
-    if (p.lower) rho_lower_(k) = *p.lower, x_lower_(k) = variable.to_x(*p.lower);
-    if (p.upper) rho_upper_(k) = *p.upper, x_upper_(k) = variable.to_x(*p.upper);
+    if (p.lower) {
+      rho_lower_(k) = *p.lower;
+      x_lower_(k) = variable.to_x(*p.lower);
+    }
+    if (p.upper) {
+      rho_upper_(k) = *p.upper;
+      x_upper_(k) = variable.to_x(*p.upper);
+    }
     variables_.push_back(variable);
   }
 }

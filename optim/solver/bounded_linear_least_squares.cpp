@@ -88,8 +88,10 @@ class ActiveSet {
     double most = kZero;
     for (Index k = 0; k < d_.size(); ++k) {
       if (std::ranges::find(free_, k) != free_.end() || pushes_out(k, g(k))) continue;
-      if (const double inward = lengths(k) > 0 ? std::abs(g(k)) / lengths(k) : 0; inward > most)
-        most = inward, best = k;
+      if (const double inward = lengths(k) > 0 ? std::abs(g(k)) / lengths(k) : 0; inward > most) {
+        most = inward;
+        best = k;
+      }
     }
     if (best < 0) return false;
     free_.push_back(best);

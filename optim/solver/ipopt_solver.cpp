@@ -111,7 +111,10 @@ class IpoptSearch : public Ipopt::TNLP, private NlpSearch {
   }
   bool eval_jac_g(Index n, const Number* x, bool, Index m, Index, Index* row, Index* column, Number* values) override {
     if (!values) {
-      for (Index k = 0; k < n * m; ++k) row[k] = k / n, column[k] = k % n;
+      for (Index k = 0; k < n * m; ++k) {
+        row[k] = k / n;
+        column[k] = k % n;
+      }
       return true;
     }
     if (!evaluate(VectorIn(x, n))) return false;

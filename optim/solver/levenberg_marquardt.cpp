@@ -111,7 +111,8 @@ class Search {
     cost_ = result_.cost_initial = problem_.cost(point_.z);
     if (!std::isfinite(cost_)) return refused_start("the loss of its residuals is not finite");
     iterate();
-    result_.x = x_, result_.cost_final = cost_;
+    result_.x = x_;
+    result_.cost_final = cost_;
     result_.point = std::move(point_);
     return std::move(result_);
   }
@@ -119,21 +120,27 @@ class Search {
  private:
   LeastSquaresPoint evaluated(const VectorXd& x) {
     LeastSquaresPoint point;
-    point.z.setZero(problem_.size), point.z_x.setZero(problem_.size, problem_.variables());
+    point.z.setZero(problem_.size);
+    point.z_x.setZero(problem_.size, problem_.variables());
     ++result_.evaluations;
     try {
       problem_.evaluate(x, point);
     } catch (const std::exception& error) {
-      point.ok = false, point.message = error.what();
+      point.ok = false;
+      point.message = error.what();
     }
-    if (point.ok && !(point.z.allFinite() && point.z_x.allFinite()))
-      point.ok = false, point.message = "a residual or its derivative is not finite";
-    if (point.ok && !std::isfinite(point.z.squaredNorm() + point.z_x.squaredNorm()))
-      point.ok = false, point.message = fmt::format(
-                            "the squares of the residuals or of their derivatives are beyond all numbers: the largest "
-                            "residual is {:.3g} (measured - model)/sigma, the largest derivative {:.3g}. Look for "
-                            "wrong values in the data, and check sigma, also that of priors",
-                            point.z.lpNorm<Eigen::Infinity>(), point.z_x.lpNorm<Eigen::Infinity>());
+    if (point.ok && !(point.z.allFinite() && point.z_x.allFinite())) {
+      point.ok = false;
+      point.message = "a residual or its derivative is not finite";
+    }
+    if (point.ok && !std::isfinite(point.z.squaredNorm() + point.z_x.squaredNorm())) {
+      point.ok = false;
+      point.message = fmt::format(
+          "the squares of the residuals or of their derivatives are beyond all numbers: the largest "
+          "residual is {:.3g} (measured - model)/sigma, the largest derivative {:.3g}. Look for "
+          "wrong values in the data, and check sigma, also that of priors",
+          point.z.lpNorm<Eigen::Infinity>(), point.z_x.lpNorm<Eigen::Infinity>());
+    }
     if (!point.ok) {
       ++result_.failed_evaluations;
       if (result_.first_error.empty()) result_.first_error = point.message;
@@ -203,9 +210,12 @@ class Search {
   }
 
   void accept(Trial&& trial, LinearModel& model) {
-    invalid_ = 0, missed_ = 0;
+    invalid_ = 0;
+    missed_ = 0;
     if (options_.large_residuals) learn(trial.x - x_, trial.point);
-    x_ = trial.x, cost_ = trial.cost, point_ = std::move(trial.point);
+    x_ = trial.x;
+    cost_ = trial.cost;
+    point_ = std::move(trial.point);
     const double ratio = trial.gained / trial.promised;
     lambda_ = std::max(lambda_ * std::max(1. / 3, 1 - std::pow(2 * ratio - 1, 3)), kLeastDamping);
     const VectorXd D = model.D;
@@ -230,7 +240,8 @@ class Search {
                       miss, trial.promised));
       return true;
     }
-    missed_ = std::isfinite(miss) ? length : 0, missed_by_ = miss;
+    missed_ = std::isfinite(miss) ? length : 0;
+    missed_by_ = miss;
     return false;
   }
 
@@ -316,7 +327,8 @@ class Search {
   void learn(const VectorXd& s, const LeastSquaresPoint& next) {
     const VectorXd gradient = next.z_x.transpose() * next.z, crossed = point_.z_x.transpose() * next.z;
     learnt_.S.add(s, gradient - point_.z_x.transpose() * point_.z, gradient - crossed);
-    last_step_ = s, change_ = next.z_x * s - point_.z_x * s;
+    last_step_ = s;
+    change_ = next.z_x * s - point_.z_x * s;
   }
 
   VectorXd weighed_step(const LinearModel& model, const VectorXd& lengths, double lambda) const {

@@ -25,9 +25,12 @@ class MultiplierRound : public LeastSquaresProblem {
         lower_(std::move(c_lower)),
         upper_(std::move(c_upper)),
         l_(VectorXd::Zero(lower_.size())) {
-    x_lower = given.x_lower, x_upper = given.x_upper;
+    x_lower = given.x_lower;
+    x_upper = given.x_upper;
     plain = given.plain + lower_.size();
-    loss = given.loss, groups = given.groups, parts = given.parts;
+    loss = given.loss;
+    groups = given.groups;
+    parts = given.parts;
   }
 
   void evaluate(const VectorXd& x, LeastSquaresPoint& point) override {
@@ -63,7 +66,8 @@ class MultiplierRound : public LeastSquaresProblem {
       };
     LeastSquaresResult found = solve_least_squares(*this, all.x, rest);
     const long failed = found.failed_evaluations;
-    found.iterations += all.iterations, found.failed_evaluations += all.failed_evaluations;
+    found.iterations += all.iterations;
+    found.failed_evaluations += all.failed_evaluations;
     if (!all.first_error.empty()) found.first_error = std::move(all.first_error);
     if (!is_first) found.z_initial = std::move(all.z_initial);
     all = std::move(found);
@@ -103,14 +107,17 @@ class MultiplierRound : public LeastSquaresProblem {
   bool end(LeastSquaresResult& solution, double tolerance) {
     const Best best = std::exchange(best_, {});
     if (best.x.size() > 0 && best.x == solution.x) {
-      solution.point.z.tail(l_.size()) = best.c, solution.point.z_x.bottomRows(l_.size()) = best.c_x;
+      solution.point.z.tail(l_.size()) = best.c;
+      solution.point.z_x.bottomRows(l_.size()) = best.c_x;
     } else {
-      solution.point.z.setZero(size), solution.point.z_x.setZero(size, variables());
+      solution.point.z.setZero(size);
+      solution.point.z_x.setZero(size, variables());
       given_.evaluate(solution.x, solution.point);
       ++evaluations_;
       if (!solution.point.ok) return false;
     }
-    x_ = solution.x, at_x_ = solution.point;
+    x_ = solution.x;
+    at_x_ = solution.point;
     const VectorXd beyond = beyond_limits(shifted(c()));
     settle(beyond.lpNorm<Eigen::Infinity>(), tolerance);
     l_ = w_.cwiseAbs2().cwiseProduct(beyond);
@@ -234,7 +241,8 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
   double tolerance = kLoosest, shown = 0;
   for (int k = 0; k < kRounds; ++k, tolerance *= kTightening) {
     LeastSquaresOptions of_round = options;
-    of_round.large_residuals = true, of_round.learnt = &learnt;
+    of_round.large_residuals = true;
+    of_round.learnt = &learnt;
     of_round.tolerance = std::max(kFinerLimits * options.tolerance, tolerance);
     if (options.max_evaluations)
       of_round.max_evaluations = std::max(1L, *options.max_evaluations - round.evaluations());

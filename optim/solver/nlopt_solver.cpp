@@ -190,7 +190,8 @@ class NloptSearch : private NlpSearch {
   void took(const NlpPoint& point) {
     if (point.ok) {
       f_worst_ = last_good_x_.size() > 0 ? std::max(f_worst_, point.f) : point.f;
-      last_good_ = point, last_good_x_ = x();
+      last_good_ = point;
+      last_good_x_ = x();
       if (is_local_with_gradients() && look(point) <= tolerance_ && !ended_) {
         conclude({});
         force_stop();

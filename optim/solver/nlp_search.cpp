@@ -79,23 +79,33 @@ NlpPoint NlpSearch::computed(Wanted wanted) {
   } catch (const std::bad_alloc&) {
     throw;  // says nothing about the point, and must not be remembered of it
   } catch (const std::exception& error) {
-    point.ok = false, point.message = error.what();
+    point.ok = false;
+    point.message = error.what();
   }
-  if (point.ok && !is_finite(point, wanted))
-    point.ok = false, point.message = "the objective, a constraint or a derivative is not finite";
+  if (point.ok && !is_finite(point, wanted)) {
+    point.ok = false;
+    point.message = "the objective, a constraint or a derivative is not finite";
+  }
   return point;
 }
 
 void NlpSearch::keep_best(const NlpPoint& point) {
   const auto violations = [&](const NlpPoint& p) { return problem_.sum_of_violations(p.c, constraint_tolerance_); };
   is_best_ = best_x_.size() == 0 || mbsopt::is_better(point.f, violations(point), best_.f, violations(best_));
-  if (is_best_) best_x_ = x_, best_ = point;
+  if (is_best_) {
+    best_x_ = x_;
+    best_ = point;
+  }
 }
 
 double NlpSearch::look(const NlpPoint& point) {
   if (!feasible(point) || !as_good_as_best(point.f)) return std::numeric_limits<double>::infinity();
   const double distance = optimality(problem_, x_, point);
-  if (!has_solution() || distance < distance_) solution_x_ = x_, solution_ = point, distance_ = distance;
+  if (!has_solution() || distance < distance_) {
+    solution_x_ = x_;
+    solution_ = point;
+    distance_ = distance;
+  }
   return distance;
 }
 
@@ -104,8 +114,14 @@ bool NlpSearch::report(const NlpPoint& point, double distance) const {
 }
 
 void NlpSearch::take_solution() {
-  if (best_x_.size() > 0) result_.x = best_x_, result_.point = best_;
-  if (has_solution()) result_.x = solution_x_, result_.point = solution_;
+  if (best_x_.size() > 0) {
+    result_.x = best_x_;
+    result_.point = best_;
+  }
+  if (has_solution()) {
+    result_.x = solution_x_;
+    result_.point = solution_;
+  }
 }
 
 void NlpSearch::end_refused() {

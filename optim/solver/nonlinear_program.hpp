@@ -54,7 +54,8 @@ struct NonlinearProgram {
   virtual void evaluate(const Eigen::VectorXd& x, NlpPoint& point) = 0;
   // Evaluates f and c alone, if they are cheaper than with derivatives.
   virtual void evaluate_values(const Eigen::VectorXd& x, NlpPoint& point) {
-    point.f_x.setZero(x.size()), point.c_x.setZero(constraints(), x.size());
+    point.f_x.setZero(x.size());
+    point.c_x.setZero(constraints(), x.size());
     evaluate(x, point);
   }
   // Sets second derivatives of f, then of each c: n x n each. Returns false if there are none.

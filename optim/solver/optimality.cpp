@@ -72,7 +72,8 @@ Stationarity stationarity(const NonlinearProgram& problem, const VectorXd& x, co
     if (near(c, lower)) multipliers.push_back({i, -1, c - lower});
   }
   Stationarity found;
-  found.multipliers.setZero(problem.constraints()), found.pulls.setZero(problem.constraints());
+  found.multipliers.setZero(problem.constraints());
+  found.pulls.setZero(problem.constraints());
   double complementarity = 0;
   if (!multipliers.empty()) {
     const NearBounds bounds = near_bounds(problem, x, point, std::move(multipliers));
@@ -98,7 +99,8 @@ double optimality(const NonlinearProgram& problem, const VectorXd& x, const NlpP
 
 Conflict conflict(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point, double tolerance) {
   Conflict found;
-  found.of_constraints.setZero(problem.constraints()), found.of_bounds.setZero(x.size());
+  found.of_constraints.setZero(problem.constraints());
+  found.of_bounds.setZero(x.size());
   VectorXd V_x = VectorXd::Zero(x.size());
   std::vector<Multiplier> others;
   for (Index i = 0; i < problem.constraints(); ++i) {

@@ -21,7 +21,9 @@ std::string SolverOutcome::failures() const {
 }
 
 void SolverOutcome::take_counts(const SolverOutcome& of) {
-  iterations = of.iterations, evaluations = of.evaluations, failed_evaluations = of.failed_evaluations;
+  iterations = of.iterations;
+  evaluations = of.evaluations;
+  failed_evaluations = of.failed_evaluations;
 }
 
 void SolverOutcome::end(SolverStatus how, std::string words) { status = how, message = std::move(words); }
