@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Keeps the measured figures of `mbsopt tradeoff` in data/tradeoffs/ and writes them into docs/tradeoffs.md.
 
-    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep,alpha}/NAME to data/tradeoffs/; what is not there stays
+    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep}/NAME to data/tradeoffs/; what is not there stays
     docs/tradeoffs.py rises OUT     of one output folder: whether curves are monotone, where an error rises along one, and why
     docs/tradeoffs.py write         from data/tradeoffs/ to docs/tradeoffs.md (between its two markers) and docs/tradeoffs/*.svg
 
@@ -95,34 +95,28 @@ def keep(runs):
             gallery.append(fit_row(gallery[-1], result["fit"]))
     if gallery:
         write_rows(DATA / "gallery.csv", gallery)
-    for kind in ("sweep", "alpha"):
-        for folder in sorted((runs / kind).glob("*")):
-            result = json.loads((folder / "result.json").read_text())
-            name = folder.name
-            rows = rows_of(folder / "tradeoff.csv")
-            if kind == "sweep":
-                names = [c for c in rows[0] if c in KEPT or c.startswith(("error ", "deviation "))]
-                rows = [{c: r[c] if c in EXACT else short(r[c]) for c in names} for r in rows]
-            else:
-                names = [c for c in rows[0] if not c.endswith("message")]
-                rows = [{c: short(r[c]) for c in names} for r in rows]
-            write_rows(DATA / f"{kind}_{name}.csv", rows)
-            reference = result["reference"]
-            about.append({
-                "file": f"{kind}_{name}.csv", "problem": name.replace("__", "/"), "kind": kind,
-                "command": "mbsopt " + result["provenance"]["command_line"].removeprefix("mbsopt ").split(" --out")[0],
-                "machine": f"{result['machine']['cpu']}, {result['machine']['cores']} cores",
-                "load": f"{result['machine']['load'] or 0:.1f}",
-                "first": method_in_words(reference["first"]),
-                "second": method_in_words(reference["second"]),
-                "apart": json.dumps({q: float(f"{v['apart']:.2g}") for q, v in reference["quantities"].items()}),
-                "absolute": json.dumps(absolute_in(reference)),
-                "advice": json.dumps([r["in_words"] for r in result.get("recommendations", [])]),
-            })
+    for folder in sorted((runs / "sweep").glob("*")):
+        result = json.loads((folder / "result.json").read_text())
+        rows = rows_of(folder / "tradeoff.csv")
+        names = [c for c in rows[0] if c in KEPT or c.startswith(("error ", "deviation "))]
+        file = f"sweep_{folder.name}.csv"
+        write_rows(DATA / file, [{c: r[c] if c in EXACT else short(r[c]) for c in names} for r in rows])
+        reference = result["reference"]
+        about.append({
+            "file": file, "problem": folder.name.replace("__", "/"),
+            "command": "mbsopt " + result["provenance"]["command_line"].removeprefix("mbsopt ").split(" --out")[0],
+            "machine": f"{result['machine']['cpu']}, {result['machine']['cores']} cores",
+            "load": f"{result['machine']['load'] or 0:.1f}",
+            "first": method_in_words(reference["first"]),
+            "second": method_in_words(reference["second"]),
+            "apart": json.dumps({q: float(f"{v['apart']:.2g}") for q, v in reference["quantities"].items()}),
+            "absolute": json.dumps(absolute_in(reference)),
+            "advice": json.dumps([r["in_words"] for r in result.get("recommendations", [])]),
+        })
     again = {a["file"] for a in about}
     kept = [r for r in rows_of(DATA / "runs.csv") if r["file"] not in again] if (DATA / "runs.csv").exists() else []
     kept = [dict({name: r.get(name, "[]") for name in about[0]}) for r in kept] if about else kept
-    write_rows(DATA / "runs.csv", sorted(kept + about, key=lambda a: (a["kind"] != "sweep", a["file"])))
+    write_rows(DATA / "runs.csv", sorted(kept + about, key=lambda a: a["file"]))
 
 
 # ---- the page
@@ -186,29 +180,6 @@ def sweep_section(run):
     return lines
 
 
-def alpha_section(run):
-    rows = rows_of(DATA / run["file"])
-    stem = run["file"].removesuffix(".csv")
-    objective = next(q for q in json.loads(run["apart"]) if q not in ("motion", "sensors"))
-    lines = [f"### Penalty: `{run['problem']}`", "", f"    {run['command']}", "",
-             "The first columns are relative errors of the accelerations at 100 states of the motion. The others are runs,",
-             f"quasi-definite and by Cholesky: error of `{objective}`, right-hand sides, drift of the constraints [m].", ""]
-    cells = []
-    for r in rows:
-        pair = lambda c: f"{r['quasidefinite ' + c] or '-'}, {r['cholesky ' + c] or '-'}"
-        ok = lambda s: r[f"{s} status"] == "ok"
-        rhs = ", ".join(r[f"{s} rhs_evaluations"] + ("" if ok(s) else " (gave up)") for s in ("quasidefinite", "cholesky"))
-        cells.append([f"{float(r['alpha']):.0e}", r["acceleration model_error"], r["acceleration rounding"],
-                      r["acceleration augmented_lagrangian"], pair("error " + objective), rhs, pair("drift")])
-    lines += table(["alpha", "model", "rounding by Cholesky", "augmented Lagrangian", f"error of {objective}", "right-hand sides", "drift"], cells)
-    names = {"acceleration model_error": "model", "acceleration rounding": "rounding", "acceleration augmented_lagrangian": "augmented"}
-    series = {label: [(float(r["alpha"]), number(r[c])) for r in rows if number(r[c]) > 0] for c, label in names.items()}
-    file = PLOTS / f"{stem}.svg"
-    if log_plot(file, f"{run['problem']}: accelerations", "alpha", "relative error", {k: v for k, v in series.items() if v}):
-        lines += [f"![errors of accelerations over alpha](tradeoffs/{file.name})", ""]
-    return lines
-
-
 def write():
     PLOTS.mkdir(parents=True, exist_ok=True)
     runs = rows_of(DATA / "runs.csv")
@@ -220,7 +191,7 @@ def write():
                            "machine, and the order of close ones is uncertain. Errors and counts do not depend on it.") + [""]
     lines += gallery_section()
     for run in runs:
-        lines += sweep_section(run) if run["kind"] == "sweep" else alpha_section(run)
+        lines += sweep_section(run)
     page = PAGE.read_text()
     before, rest = page.split(BEGIN)
     after = rest.split(END)[1]

@@ -103,9 +103,6 @@ void tradeoff_options(CLI::App& sub, CommandOptions& options) {
                  "seconds for the sweep, roughly; 0: only the file's own settings and the defaults")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  sub.add_option("--alpha", options.alpha,
-                 "instead of the sweep, show the effect of alpha on the penalty form: 1e2:1e16")
-      ->type_name("LOW:HIGH");
   sub.add_option("--apply", options.apply,
                  "also write recommended.json, the problem with the fastest settings of this accuracy: 1e-6")
       ->check(CLI::Range(1e-15, 1.0))

@@ -13,38 +13,22 @@
 namespace mbsopt::inline app {
 namespace {
 
-TradeoffOptions options_of(Run& run) {
-  return {.budget_seconds = run.context.options.budget,
-          .interrupted = [] { return interrupted(); },
-          .progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); }};
-}
-
-// Adds the reference and the table, or why there is none. Returns whether there is one.
-template <class Study>
-bool add_table(RunPage& page, const Tradeoff& table, const Study& study) {
-  Run& run = page.run;
-  run.progress.finish();
-  if (!table.ok()) {
-    table.interrupted ? run.stopped("there was no reference yet, nothing is kept") : run.failed(table.message);
-    return false;
-  }
-  add_machine(page);
-  show_reference(page, table.reference);
-  if (!table.rows.empty()) run.write("tradeoff.csv", to_csv(study));
-  return true;
-}
-
-void stopped(Run& run, const Tradeoff& table) {
-  run.stopped(table.rows.empty() ? "nothing was measured yet" : "tradeoff.csv holds what was measured");
-}
-
+// Measures, and shows what was measured.
 void sweep(Run& run) {
   constexpr double kFits = 0.2;  // of the budget, for the sums of squares at settings that may be advised
-  const TradeoffOptions options = options_of(run);
+  const TradeoffOptions options{
+      .budget_seconds = run.context.options.budget,
+      .interrupted = [] { return interrupted(); },
+      .progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); }};
   const Problem& problem = run.problem;
   Tradeoff tradeoff = measure_tradeoff(problem.scene, objectives_of(problem), options);
+  run.progress.finish();
+  if (!tradeoff.ok())
+    return tradeoff.interrupted ? run.stopped("there was no reference yet, nothing is kept")
+                                : run.failed(tradeoff.message);
   RunPage page(run);
-  if (!add_table(page, tradeoff, tradeoff)) return;
+  show_reference(page, tradeoff.reference);
+  if (!tradeoff.rows.empty()) run.write("tradeoff.csv", to_csv(tradeoff));
   show_given_settings(run, tradeoff);
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
   const CutProblem cut = cut_into_windows(problem, data, {}, [](double) { return !interrupted(); });
@@ -60,7 +44,7 @@ void sweep(Run& run) {
     show_outcomes(run, tradeoff);
   }
   if (tradeoff.interrupted) {
-    stopped(run, tradeoff);
+    run.stopped(tradeoff.rows.empty() ? "nothing was measured yet" : "tradeoff.csv holds what was measured");
   } else if (run.context.options.apply) {
     const Recommendation advice = adviser.at(*run.context.options.apply);
     show_applied(page, tradeoff, advice, adviser.fit());
@@ -71,27 +55,12 @@ void sweep(Run& run) {
   page.write();
 }
 
-void penalty_study(Run& run) {
-  const PenaltyStudy study = study_penalty(run.problem.scene, objectives_of(run.problem),
-                                           alphas_of(run.context.options.alpha), options_of(run));
-  RunPage page(run);
-  if (!add_table(page, study.table, study)) return;
-  if (!study.table.rows.empty()) show_penalty_study(page, study);
-  if (study.table.interrupted) stopped(run, study.table);
-  add_penalty_plots(page, study);
-  page.write();
-}
-
 }  // namespace
 
 int tradeoff_command(const CommandContext& context) {
   const CommandOptions& options = context.options;
-  if (!options.alpha.empty()) {
-    if (options.apply) throw std::invalid_argument("--apply: the study that --alpha makes recommends nothing");
-    alphas_of(options.alpha);  // throws
-  } else if (options.apply && options.budget == 0) {
+  if (options.apply && options.budget == 0)
     throw std::invalid_argument("--apply: with --budget 0 nothing is measured that could be recommended");
-  }
   Run run(context);
   const Scene& scene = run.problem.scene;
   const Mechanism mechanism(scene, parameter_values(scene));
@@ -104,7 +73,7 @@ int tradeoff_command(const CommandContext& context) {
   const Json& load = machine.at("load");
   if (load.is_number() && load.get<double>() > 0.7 * machine.at("cores").get<double>())
     run.warn(fmt::format("the machine is busy (load {:.1f}): times come out longer than they are", load.get<double>()));
-  options.alpha.empty() ? sweep(run) : penalty_study(run);
+  sweep(run);
   return run.finish();
 }
 

@@ -25,8 +25,9 @@ using Eigen::Index;
 constexpr double kAdvisedAccuracies[] = {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
 
 Json row_json(const Tradeoff& tradeoff, const TradeoffRow& row) {
-  Json json{{"setting", in_words(row.setting)}};
-  add_columns(json, tradeoff, row, {"status", "message", "wall_seconds"});
+  Json json{{"setting", in_words(row.setting)}, {"status", to_string(row.status)}};
+  if (!row.message.empty()) json["message"] = row.message;
+  if (row.ok()) json["wall_seconds"] = row.wall_seconds;
   json["errors"] = errors_json(tradeoff.quantities(), row.errors);
   return json;
 }
@@ -86,7 +87,7 @@ Json advice_json(const Tradeoff& tradeoff, const Recommendation& advice, const F
 }
 
 // Says what may make a reference uncertain.
-std::string doubt(const Quantity& q, const std::vector<ObjectiveSpec>& objectives) {
+std::string cause_of_uncertainty(const Quantity& q, const std::vector<ObjectiveSpec>& objectives) {
   const std::string any = "a chaotic motion, or a law that is not smooth?";
   const auto spec = std::ranges::find(objectives, q.objective_name, &ObjectiveSpec::name);
   if (spec == objectives.end() || !spec->is_extreme()) return any;
@@ -119,8 +120,7 @@ std::string unit_of_error(const Quantity& q, const ObjectiveUnits& units) {
   return q.kind == QuantityKind::objective ? shown_unit(units, q.objective_name) : kUnknownUnit;
 }
 
-// Draws lines through bounds. It draws points for errors below their bound, and for settings that a tighter one
-// dominates.
+// Draws lines through bounds; points instead of a line of one setting.
 LinePlot work_precision(const Tradeoff& tradeoff, const ObjectiveUnits& units, std::size_t quantity,
                         std::string_view group) {
   const std::vector<TradeoffRow>& rows = tradeoff.rows;
@@ -133,24 +133,17 @@ LinePlot work_precision(const Tradeoff& tradeoff, const ObjectiveUnits& units, s
                 .logarithmic_y = true,
                 .logarithmic_x = true};
   const auto add = [&](PlotSeries& series, std::size_t row, Eigen::VectorXd TradeoffRow::*errors) {
-    series.x.push_back(rows[row].wall_seconds), series.y.push_back((rows[row].*errors)(column));
+    series.x.push_back(rows[row].wall_seconds);
+    series.y.push_back((rows[row].*errors)(column));
   };
-  std::vector<PlotSeries> points;
   for (const WorkPrecisionCurve& curve : work_precision_curves(rows, tradeoff.quantities(), quantity)) {
     if (group_of(rows[curve.line.front()].setting) != group) continue;
-    PlotSeries off_line{"", {}, {}, Mark::points, plot.series.size()};
-    PlotSeries& line = plot.series.emplace_back(PlotSeries{curve.name, {}, {}, Mark::line});
     const std::vector<std::size_t> connected = slower_and_slower(rows, curve.line);
+    PlotSeries& line =
+        plot.series.emplace_back(PlotSeries{curve.name, {}, {}, connected.size() > 1 ? Mark::line : Mark::points});
     for (const std::size_t i : connected) add(line, i, &TradeoffRow::bounds);
-    if (connected.size() == 1) add(off_line, connected.front(), &TradeoffRow::bounds);
-    for (const std::vector<std::size_t>* some : {&curve.line, &curve.beside})
-      for (const std::size_t i : *some)
-        if (!std::ranges::binary_search(connected, i) || rows[i].errors(column) < rows[i].bounds(column))
-          add(off_line, i, &TradeoffRow::errors);
-    if (!off_line.x.empty()) points.push_back(std::move(off_line));
   }
   if (plot.series.empty()) return plot;
-  plot.series.insert(plot.series.end(), points.begin(), points.end());
   PlotSeries front{"Pareto front", {}, {}, Mark::rings};
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (group_of(rows[i].setting) == group && rows[i].pareto[quantity] && better_than_zero(q, rows[i].bounds(column)))
@@ -164,10 +157,9 @@ LinePlot work_precision(const Tradeoff& tradeoff, const ObjectiveUnits& units, s
 
 constexpr const char* kHowToRead =
     "Lines lead from loose to tight settings through bounds: the bound of a setting is the largest error of it and of "
-    "all tighter settings of its curve, since an error that passes through zero is small by chance. Points in a "
-    "curve's colour beside its line: errors that are below their bounds, and settings for which a tighter one needed "
-    "no more right-hand sides or no more time. A relative bound of 1 or more, as the answer zero would have, is left "
-    "out.";
+    "all tighter settings of its curve, since an error that passes through zero is small by chance. Settings are left "
+    "out if a tighter one needed no more right-hand sides or no more time. So is a relative bound of 1 or more, as the "
+    "answer zero would have.";
 
 // "The fastest setting for 1e-06 in track: dopri5 at rtol 1e-05, 12 ms (error 3e-07); as in the file: 1.2e-04 in 8 ms."
 std::string sentence_of(const Json& result, const Tradeoff& tradeoff, std::size_t quantity) {
@@ -232,13 +224,10 @@ void add_rows(RunPage& page, const Tradeoff& tradeoff) {
 
 }  // namespace
 
-void add_machine(RunPage& page) {
-  page.remark("Times are medians, measured on " + machine_name(page.run.result.at("machine")) + ".");
-}
-
 void show_reference(RunPage& page, const TradeoffReference& reference) {
   Run& run = page.run;
   const TradeoffErrors& errors = *reference.errors;
+  page.remark("Times are medians, measured on " + machine_name(run.result.at("machine")) + ".");
   const auto method = [](const ReferenceMethod& m) {
     return Json{{"integrator", m.integrator},
                 m.step ? Json{"step", *m.step} : Json{"rtol", m.rtol},
@@ -254,9 +243,9 @@ void show_reference(RunPage& page, const TradeoffReference& reference) {
     if (q.kind == QuantityKind::objective) words = significant(errors.exact().psi(q.objective), 14);
     if (q.kind == QuantityKind::motion && q.relative) words = fmt::format("{:.3g} m from its start", q.scale);
     table.add({q.name, words, fmt::format("{:.1e}{}", q.certificate, q.relative ? "" : " (absolute)")});
-    if (q.is_doubtful())
+    if (q.is_uncertain())
       run.warn(fmt::format("the reference of {} is known to {:.1e} only: smaller errors cannot be measured ({})",
-                           q.name, q.certificate, doubt(q, run.problem.objectives)));
+                           q.name, q.certificate, cause_of_uncertainty(q, run.problem.objectives)));
   }
   page.heading("Reference");
   page.paragraph(

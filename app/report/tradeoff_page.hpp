@@ -7,8 +7,7 @@
 
 namespace mbsopt::inline app {
 
-void add_machine(RunPage& page);  // that of result.json
-// Adds the methods, their difference and the right values, with a warning if these are uncertain.
+// Adds the machine, the methods, their difference and the right values, with a warning if these are uncertain.
 void show_reference(RunPage& page, const TradeoffReference& reference);
 // Adds the scene's own settings and the defaults.
 void show_given_settings(Run& run, const Tradeoff& tradeoff);
@@ -21,8 +20,5 @@ void show_outcomes(Run& run, const Tradeoff& tradeoff);  // how many were measur
 void show_applied(RunPage& page, const Tradeoff& tradeoff, const Recommendation& advice, const FitErrors* fit);
 // Work-precision plots, and all settings.
 void add_work_precision(RunPage& page, const Tradeoff& tradeoff);
-
-void show_penalty_study(RunPage& page, const PenaltyStudy& study);
-void add_penalty_plots(RunPage& page, const PenaltyStudy& study);
 
 }  // namespace mbsopt::inline app

@@ -23,11 +23,6 @@ std::string in_words(const AccuracyChoice& choice) {
                      choice.verified_by.type, choice.verified_by.rtol);
 }
 
-std::string features_in_words(const SceneFeatures& f) {
-  return fmt::format("{}, {}, {}", counted(f.bodies, "body", "bodies"), counted(f.loops, "loop"),
-                     counted(f.drives, "drive"));
-}
-
 Json to_json(const AccuracyChoice& choice, const std::string& words) {
   const auto integrator = [](const IntegratorSettings& s) {
     return Json{{"type", s.type}, {"rtol", s.rtol}, {"atol", s.atol}};
@@ -41,12 +36,7 @@ Json to_json(const AccuracyChoice& choice, const std::string& words) {
             {"rounding", AccuracyChoice::kRounding}};
   for (const ErrorEstimate& e : choice.estimates)
     json["errors"][e.quantity] = {{"estimate", e.error}, {"relative", e.relative}};
-  const SceneFeatures& f = choice.features;
-  json["features"] = {{"bodies", f.bodies},
-                      {"loops", f.loops},
-                      {"drives", f.drives},
-                      {"stability_limited", f.limited_steps},
-                      {"fastest_rate", f.stiffest_rate}};
+  json["features"] = {{"stability_limited", choice.limited_steps}, {"fastest_rate", choice.stiffest_rate}};
   json["simulations"] = choice.simulations;
   return json;
 }
@@ -84,8 +74,7 @@ bool settle_accuracy(Run& run, const Scene& simulated, const std::vector<Objecti
   }
   const std::string words = in_words(choice);
   run.result["accuracy"] = to_json(choice, words);
-  run.context.out << fmt::format("accuracy: {}; {}, {}\n", words, features_in_words(choice.features),
-                                 counted(choice.simulations, "simulation"));
+  run.context.out << fmt::format("accuracy: {}; {}\n", words, counted(choice.simulations, "simulation"));
   if (!choice.reached)
     run.warn(
         fmt::format("simulation.accuracy: {:.0e} is not reached, the estimated error is {:.1e} (rounding, a chaotic "

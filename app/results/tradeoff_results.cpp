@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <string_view>
 
 #include "app/results/trajectory_csv.hpp"
@@ -30,18 +29,6 @@ std::string csv_text(const Json& value) {
   if (value.is_string()) return csv_cell(value.get<std::string>());
   if (!value.is_number_float()) return value.is_null() ? "" : value.dump();
   return std::isfinite(value.get<double>()) ? fmt::format("{:.6g}", value.get<double>()) : "";
-}
-
-std::string csv_of(const std::vector<Json>& rows) {
-  std::string text;
-  for (const Json& row : rows) {
-    std::vector<std::string> columns, cells;
-    for (const auto& [column, value] : row.items())
-      columns.push_back(csv_cell(column)), cells.push_back(csv_text(value));
-    if (text.empty()) text = fmt::format("{}\n", fmt::join(columns, ","));
-    text += fmt::format("{}\n", fmt::join(cells, ","));
-  }
-  return text;
 }
 
 }  // namespace
@@ -85,35 +72,19 @@ Json columns_of(const TradeoffRow& r, const std::vector<Quantity>& quantities) {
   return row;
 }
 
-Json columns_of(const PenaltyStudyRow& r, const PenaltyStudy& study) {
-  const std::vector<Quantity>& quantities = study.table.quantities();
-  Json row{{"alpha", r.alpha}};
-  for (const AccelerationError& e : kAccelerationErrors) row[fmt::format("acceleration {}", e.column)] = r.*e.value;
-  for (const PenaltyRun& solver : kPenaltyRuns) {
-    const TradeoffRow& run = study.table.rows[r.*solver.row];
-    const std::string prefix = std::string(solver.column) + " ";
-    const Json columns = columns_of(run, quantities);
-    row[prefix + "status"] = run.ok() ? "ok" : "failed";
-    for (const char* column : {"wall_seconds", "steps", "rhs_evaluations", "factorisations"})
-      row[prefix + column] = columns.at(column);
-    row[prefix + "drift"] = columns.at("position_violation");
-    add_errors(row, prefix + "error ", quantities, run.errors);
-    row[prefix + "message"] = run.message;
-  }
-  add_errors(row, "rounding ", quantities, r.rounding);
-  return row;
-}
-
 std::string to_csv(const Tradeoff& tradeoff) {
-  std::vector<Json> rows;
-  for (const TradeoffRow& row : tradeoff.rows) rows.push_back(columns_of(row, tradeoff.quantities()));
-  return csv_of(rows);
-}
-
-std::string to_csv(const PenaltyStudy& study) {
-  std::vector<Json> rows;
-  for (const PenaltyStudyRow& row : study.rows) rows.push_back(columns_of(row, study));
-  return csv_of(rows);
+  std::string text;
+  for (const TradeoffRow& row : tradeoff.rows) {
+    const Json all = columns_of(row, tradeoff.quantities());
+    std::vector<std::string> columns, cells;
+    for (const auto& [column, value] : all.items()) {
+      columns.push_back(csv_cell(column));
+      cells.push_back(csv_text(value));
+    }
+    if (text.empty()) text = fmt::format("{}\n", fmt::join(columns, ","));
+    text += fmt::format("{}\n", fmt::join(cells, ","));
+  }
+  return text;
 }
 
 Json errors_json(const std::vector<Quantity>& quantities, const Eigen::VectorXd& errors) {
@@ -131,13 +102,6 @@ std::string error_text(double error, double certificate) {
 
 std::string duration_text(double seconds) {
   return seconds < 1 ? fmt::format("{:.3g} ms", 1e3 * seconds) : fmt::format("{:.3g} s", seconds);
-}
-
-void add_columns(Json& json, const Tradeoff& tradeoff, const TradeoffRow& row,
-                 std::initializer_list<const char*> names) {
-  const Json columns = columns_of(row, tradeoff.quantities());
-  for (const char* name : names)
-    if (const Json& value = columns.at(name); !value.is_null() && value != "") json[name] = value;
 }
 
 }  // namespace mbsopt::inline app

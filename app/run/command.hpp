@@ -29,7 +29,6 @@ struct CommandOptions {
   int recover = 0;                    // --recover of identify: fits of simulated records
   int bootstrap = 0;                  // --bootstrap of identify: fits of resampled residuals
   double budget = 60;                 // --budget of tradeoff [s]
-  std::string alpha;                  // --alpha of tradeoff: the penalty study
   std::optional<double> apply;        // --apply of tradeoff: the accuracy wanted
   std::optional<double> at;           // --at of linearise [s]
   std::vector<std::string> inputs;    // --inputs of linearise: parameters

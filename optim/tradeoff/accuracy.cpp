@@ -5,31 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <optional>
 #include <string_view>
 
-#include "core/expression/counted.hpp"
 #include "core/scene/vocabulary.hpp"
 #include "core/watch/stiffness.hpp"
 #include "optim/tradeoff/tradeoff_reference.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
-
-// Counts independent closed chains: joints between bodies that other joints connect already. The ground is a body here.
-int loops_of(const Scene& scene) {
-  std::map<std::string, int> group;  // of connected bodies; 0: of the ground
-  for (const Body& body : scene.bodies) group.emplace(body.name, static_cast<int>(group.size()) + 1);
-  int loops = 0;
-  for (const Joint& joint : scene.joints) {
-    const int one = group[joint.body1], other = group[joint.body2];
-    if (one == other) ++loops;
-    for (auto& [body, number] : group)
-      if (number == one) number = other;
-  }
-  return loops;
-}
 
 double largest_of(const std::vector<ErrorEstimate>& estimates) {
   double largest = 0;
@@ -45,7 +29,6 @@ class Chooser {
   Chooser(const Scene& scene, const std::vector<Objective>& objectives, const AccuracyOptions& options)
       : runs_(scene, objectives), options_(options), base_(scene.simulation) {
     result_.wanted = base_.accuracy.value();
-    result_.features = {static_cast<int>(scene.bodies.size()), loops_of(scene), static_cast<int>(scene.drives.size())};
     base_.accuracy.reset();
   }
 
@@ -120,12 +103,11 @@ class Chooser {
   bool is_wrong_method(const Point& point) {
     const SimulationStatistics& s = point.answer.statistics;
     if (implicit_ || s.watched_steps == 0) return false;
-    result_.features.limited_steps =
-        static_cast<double>(s.stability_limited_steps) / static_cast<double>(s.watched_steps);
-    result_.features.stiffest_rate = s.stiffest_rate;
+    result_.limited_steps = static_cast<double>(s.stability_limited_steps) / static_cast<double>(s.watched_steps);
+    result_.stiffest_rate = s.stiffest_rate;
     if (is_stability_limited(s))
       stiff_why_ = fmt::format("stability limits {:.0f} % of the steps of {}, at rates up to {:.1e} 1/s",
-                               100 * result_.features.limited_steps, method_, s.stiffest_rate);
+                               100 * result_.limited_steps, method_, s.stiffest_rate);
     return is_stability_limited(s);
   }
 

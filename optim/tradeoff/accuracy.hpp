@@ -23,13 +23,6 @@
 
 namespace mbsopt::inline optim {
 
-// The properties of the scene that the choice uses.
-struct SceneFeatures {
-  int bodies = 0, loops = 0, drives = 0;
-  double stiffest_rate = 0;  // |lambda| of steps at the edge of stability [1/s]; 0: there were none
-  double limited_steps = 0;  // their part of the explicit run's
-};
-
 struct ErrorEstimate {
   std::string quantity;  // an objective's name, or "motion"
   bool relative = true;  // absolute where the quantity is near zero
@@ -45,9 +38,10 @@ struct AccuracyChoice {
   double wanted = 0;
   SimulationSettings settings;  // the scene's own, with integrator, rtol and atol chosen; without `accuracy`
   std::vector<ErrorEstimate> estimates;
-  bool reached = false;  // all of them are within what is wanted
-  SceneFeatures features;
-  std::string why;  // the method, in words
+  bool reached = false;      // all of them are within what is wanted
+  double stiffest_rate = 0;  // |lambda| of steps at the edge of stability [1/s]; 0: there were none
+  double limited_steps = 0;  // their part of the explicit run's
+  std::string why;           // the method, in words
   IntegratorSettings verified_by;
   long simulations = 0;
   double largest_error() const;

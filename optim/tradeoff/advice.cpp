@@ -7,7 +7,9 @@
 #include <limits>
 
 namespace mbsopt::inline optim {
+namespace {
 
+// Returns the objectives, or the sensors if there are none, or the motion.
 std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities) {
   std::vector<std::size_t> found;
   for (const QuantityKind kind : {QuantityKind::objective, QuantityKind::sensors, QuantityKind::motion}) {
@@ -17,6 +19,8 @@ std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities
   }
   return found;
 }
+
+}  // namespace
 
 std::optional<std::size_t> row_with(const Tradeoff& tradeoff, std::size_t row, QuantityKind kind) {
   const TradeoffSetting& setting = tradeoff.rows[row].setting;

@@ -42,9 +42,6 @@ Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quan
 // looser simulation may replace it if it is already as exact as the reference. There is none if none was measured.
 std::optional<std::size_t> row_with(const Tradeoff& tradeoff, std::size_t row, QuantityKind kind);
 
-// Returns the objectives, or the sensors if there are none, or the motion.
-std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities);
-
 class TaskAdviser {
  public:
   // fit is null if nothing is fitted. seconds is the total for simulations of the fit. All must outlive this.

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "core/scene/settings.hpp"
-#include "optim/fit/unknown_parameters.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
@@ -41,17 +40,13 @@ class FitErrors {
   struct Fit {
     std::string message = {};  // why there is none
     double cost = 0;
-    Eigen::VectorXd gradient = {};
+    Eigen::VectorXd gradient = {};  // times the sizes of the unknowns
   };
   Fit fit(const SimulationSettings& settings) const;
-  Error apart(const Fit& fit, const Fit& right) const;
-  void find_right();
 
   const Problem& problem_;
   const std::vector<CsvTable>& data_;
   const std::function<bool()> interrupted_;
-  std::vector<UnknownParameter> unknowns_;
-  Eigen::VectorXd size_;  // of the unknowns
   Fit right_;
   Error certificate_;
 };

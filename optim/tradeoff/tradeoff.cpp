@@ -1,17 +1,13 @@
 #include "optim/tradeoff/tradeoff.hpp"
 
-#include <fast_float/fast_float.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <sstream>
-#include <stdexcept>
 
 #include "core/cvodes/cvodes.hpp"
-#include "core/dynamics/spatial_dynamics.hpp"
 #include "core/tableau/tableaus.hpp"
 #include "optim/machine/median.hpp"
 
@@ -38,25 +34,14 @@ Curve curve_of(const std::string& name, const SimulationSettings& base, const st
   return curve;
 }
 
-double largest_relative_error(const Eigen::MatrixXd& of, const Eigen::MatrixXd& against) {
-  double largest = 0;
-  for (Index i = 0; i < of.cols(); ++i) {
-    const double size = against.col(i).cwiseAbs().maxCoeff();
-    const double error = (of.col(i) - against.col(i)).cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
-    if (!std::isfinite(error)) return kNaN;
-    if (size > 0) largest = std::max(largest, error / size);
-  }
-  return largest;
-}
-
-// Finds the reference, measures rows, and times them again. The two studies choose the settings.
+// Finds the reference, measures rows, and times them again.
 class Sweep {
  public:
   Sweep(const Scene& scene, const std::vector<Objective>& objectives, const TradeoffOptions& options)
       : runs_(scene, objectives), options_(options), stopwatch_(options.clock) {}
 
-  Tradeoff study_speed() {
-    if (!find_reference(true)) return finish();
+  Tradeoff run() {
+    if (!find_reference()) return finish();
     measure_given_settings();
     budget_.emplace(options_.clock);
     if (options_.budget_seconds > 0) {
@@ -70,28 +55,6 @@ class Sweep {
     return finish();
   }
 
-  PenaltyStudy study_penalty(const std::vector<double>& alphas) {
-    constexpr int kRounds = 3;
-    PenaltyStudy study;
-    if (find_reference(false) && !interrupted()) {
-      choose_settings(study);
-      // Each alpha has three runs and their repetitions.
-      const double seconds = std::max(1.0, options_.budget_seconds / (5 * static_cast<double>(alphas.size() + 1)));
-      measure(penalty_setting(study, "augmented Lagrangian", constrained(own().formulation)), seconds);
-      FormulationSettings exact;  // solves to rounding; its alpha is none of the study's
-      exact.alpha = 3e7, exact.tolerance = 1e-15;
-      const Eigen::MatrixXd exact_accelerations = accelerations(exact);
-      for (const double alpha : alphas) {
-        if (interrupted()) break;
-        add_penalty_row(study, alpha, exact_accelerations, seconds);
-        report("alpha", static_cast<double>(study.rows.size()) / static_cast<double>(alphas.size()));
-      }
-      time_again(kRounds);
-    }
-    study.table = finish();
-    return study;
-  }
-
  private:
   const SimulationSettings& own() const { return runs_.scene().simulation; }
   bool has_gradients() const { return !result_.reference.gradients_by.empty(); }
@@ -102,11 +65,10 @@ class Sweep {
     if (options_.progress) options_.progress(doing, std::clamp(done, 0.0, 1.0));
   }
 
-  bool find_reference(bool gradients) {
+  bool find_reference() {
     report("reference", 0);
     result_.reference = converged_reference(
         runs_, {.seconds_per_run = std::max(10.0, options_.budget_seconds / 6),
-                .gradients = gradients,
                 .interrupted = options_.interrupted,
                 .clock = options_.clock,
                 .progress = [this](const std::string& doing, double done) { report("reference, " + doing, done); }});
@@ -311,59 +273,6 @@ class Sweep {
     curve.last_seconds = row.wall_seconds;
   }
 
-  void choose_settings(PenaltyStudy& study) const {
-    constexpr double kRtol = 1e-9;
-    const bool is_penalty = own().formulation.type == FormulationType::penalty;
-    study.formulation = is_penalty ? own().formulation : FormulationSettings::penalty();
-    // Takes the explicit method, unless stiffness excluded it from the reference.
-    const TradeoffReference& r = result_.reference;
-    const bool is_explicit = r.first.integrator == "dopri853" || r.second.integrator == "dopri853";
-    study.integrator = with_tolerance(own(), is_explicit ? "dopri853" : "radau5", kRtol).integrator;
-  }
-
-  TradeoffSetting penalty_setting(const PenaltyStudy& study, const char* curve,
-                                  const FormulationSettings& formulation) const {
-    TradeoffSetting setting{curve, own(), {}};
-    setting.simulation.integrator = study.integrator, setting.simulation.formulation = formulation;
-    return setting;
-  }
-
-  // Accelerations at the states of the right motion, one column each; a column of NaN if they cannot be computed.
-  Eigen::MatrixXd accelerations(const FormulationSettings& formulation) const {
-    const SampledMotion& motion = result_.reference.errors->exact().motion;
-    SpatialDynamics dynamics(runs_.mechanism(), formulation);
-    Eigen::VectorXd ydot(motion.states.rows());
-    Eigen::MatrixXd a(ydot.size() / 2, motion.states.cols());
-    for (Index i = 0; i < a.cols(); ++i) {
-      const double t = motion.times[static_cast<std::size_t>(i)];
-      if (!dynamics.evaluate(t, motion.states.col(i), motion.angles.col(i), ydot)) ydot.setConstant(kNaN);
-      a.col(i) = ydot.tail(a.rows());
-    }
-    return a;
-  }
-
-  void add_penalty_row(PenaltyStudy& study, double alpha, const Eigen::MatrixXd& exact, double seconds) {
-    PenaltyStudyRow& row = study.rows.emplace_back();
-    row.alpha = alpha;
-    FormulationSettings quasidefinite = study.formulation, augmented;
-    quasidefinite.alpha = augmented.alpha = alpha;
-    augmented.iterations = 3;
-    FormulationSettings cholesky = quasidefinite;
-    quasidefinite.linear_solver = LinearSolver::quasidefinite, cholesky.linear_solver = LinearSolver::cholesky;
-    const Eigen::MatrixXd a = accelerations(quasidefinite);
-    row.model_error = largest_relative_error(a, exact);
-    row.rounding_error = largest_relative_error(accelerations(cholesky), a);
-    row.augmented_error = largest_relative_error(accelerations(augmented), exact);
-
-    row.quasidefinite = result_.rows.size(), row.cholesky = row.quasidefinite + 1;
-    const TradeoffSetting by_cholesky = penalty_setting(study, "penalty", cholesky);
-    const Answer quasi = measure(penalty_setting(study, "penalty", quasidefinite), seconds);
-    measure(by_cholesky, seconds);
-    Answer frozen;
-    if (quasi.ok) frozen = runs_.motion(by_cholesky.simulation, within(3 * seconds), &quasi.steps);
-    row.rounding = result_.reference.errors->of(frozen, quasi);
-  }
-
   const TradeoffRuns runs_;
   const TradeoffOptions& options_;
   const Stopwatch stopwatch_;
@@ -375,34 +284,7 @@ class Sweep {
 
 Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,
                           const TradeoffOptions& options) {
-  return Sweep(scene, objectives, options).study_speed();
-}
-
-PenaltyStudy study_penalty(const Scene& scene, const std::vector<Objective>& objectives,
-                           const std::vector<double>& alphas, const TradeoffOptions& options) {
-  return Sweep(scene, objectives, options).study_penalty(alphas);
-}
-
-std::vector<double> alphas_of(const std::string& text) {
-  const char separator = text.find(':') == std::string::npos ? ',' : ':';
-  std::vector<double> alphas;
-  std::istringstream parts(text + separator);
-  for (std::string part; std::getline(parts, part, separator);) {
-    double& alpha = alphas.emplace_back();
-    const auto [end, error] = fast_float::from_chars(part.data(), part.data() + part.size(), alpha);
-    if (error != std::errc() || end != part.data() + part.size() || !(alpha > 0) || !std::isfinite(alpha))
-      throw std::invalid_argument(fmt::format(
-          "--alpha {}: '{}' is not a positive number; allowed: 1e2:1e16 (powers of ten), or a list as 1e5,1e7", text,
-          part));
-  }
-  if (separator == ',') return alphas;
-  const double low = alphas.front(), high = alphas.back();
-  if (alphas.size() > 2) throw std::invalid_argument(fmt::format("--alpha {}: a range has two ends", text));
-  if (low > high) throw std::invalid_argument(fmt::format("--alpha {}: the first must not be larger", text));
-  if (high / low > 1e40) throw std::invalid_argument(fmt::format("--alpha {}: more than 40 powers of ten", text));
-  alphas.clear();
-  for (int k = 0; low * std::pow(10, k) <= high * (1 + 1e-9); ++k) alphas.push_back(low * std::pow(10, k));
-  return alphas;
+  return Sweep(scene, objectives, options).run();
 }
 
 }  // namespace mbsopt::inline optim

@@ -22,10 +22,10 @@ TradeoffErrors::TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Ans
     if (is_known(size, (sensors.row(s) - second.motion.sensors.row(s)).cwiseAbs().maxCoeff())) sensor_scale_(s) = size;
   }
   const auto add = [&](Quantity q, double size) {
-    const double apart = error(q, second, exact_);  // absolute, since the scale is 1
+    const double apart = error(q, second);  // absolute, since the scale is 1
     q.relative = q.kind == QuantityKind::sensors || is_known(size, apart);
     if (q.relative) q.scale = size;
-    q.certificate = error(q, second, exact_);
+    q.certificate = error(q, second);
     quantities_.push_back(std::move(q));
   };
   add({QuantityKind::motion, "motion"}, extent());
@@ -56,35 +56,35 @@ bool TradeoffErrors::has(const Quantity& q, const Answer& answer) const {
   return answer.motion.states.cols() == exact_.motion.states.cols();
 }
 
-double TradeoffErrors::error(const Quantity& q, const Answer& answer, const Answer& exact) const {
+double TradeoffErrors::error(const Quantity& q, const Answer& answer) const {
   if (!has(q, answer)) return kNaN;
-  if (q.kind == QuantityKind::motion) return distance_.between(answer.motion, exact.motion) / q.scale;
-  if (q.kind == QuantityKind::objective) return std::abs(answer.psi(q.objective) - exact.psi(q.objective)) / q.scale;
+  if (q.kind == QuantityKind::motion) return distance_.between(answer.motion, exact_.motion) / q.scale;
+  if (q.kind == QuantityKind::objective) return std::abs(answer.psi(q.objective) - exact_.psi(q.objective)) / q.scale;
   if (q.kind == QuantityKind::gradient)
-    return gradient_size(answer.psi_rho.row(q.objective) - exact.psi_rho.row(q.objective)) / q.scale;
+    return gradient_size(answer.psi_rho.row(q.objective) - exact_.psi_rho.row(q.objective)) / q.scale;
   double largest = 0;  // of the sensors
   for (Index s = 0; s < sensor_scale_.size(); ++s) {
     if (!(sensor_scale_(s) > 0)) continue;
-    const double apart = (answer.motion.sensors.row(s) - exact.motion.sensors.row(s)).cwiseAbs().maxCoeff();
+    const double apart = (answer.motion.sensors.row(s) - exact_.motion.sensors.row(s)).cwiseAbs().maxCoeff();
     if (!std::isfinite(apart)) return apart;
     largest = std::max(largest, apart / sensor_scale_(s));
   }
   return largest;
 }
 
-double TradeoffErrors::deviation(const Quantity& q, const Answer& answer, const Answer& exact) const {
+double TradeoffErrors::deviation(const Quantity& q, const Answer& answer) const {
   if (!has(q, answer)) return kNaN;
-  if (q.kind == QuantityKind::objective) return (answer.psi(q.objective) - exact.psi(q.objective)) / q.scale;
+  if (q.kind == QuantityKind::objective) return (answer.psi(q.objective) - exact_.psi(q.objective)) / q.scale;
   if (q.kind != QuantityKind::gradient) return kNaN;
-  const Eigen::VectorXd right = exact.psi_rho.row(q.objective).transpose().cwiseProduct(parameter_size_);
-  const Eigen::VectorXd change = (answer.psi_rho.row(q.objective) - exact.psi_rho.row(q.objective)).transpose();
+  const Eigen::VectorXd right = exact_.psi_rho.row(q.objective).transpose().cwiseProduct(parameter_size_);
+  const Eigen::VectorXd change = (answer.psi_rho.row(q.objective) - exact_.psi_rho.row(q.objective)).transpose();
   return change.cwiseProduct(parameter_size_).dot(right.normalized()) / q.scale;
 }
 
-Eigen::VectorXd TradeoffErrors::each(Measure measure, const Answer& answer, const Answer& exact) const {
+Eigen::VectorXd TradeoffErrors::each(Measure measure, const Answer& answer) const {
   Eigen::VectorXd values = Eigen::VectorXd::Constant(std::ssize(quantities_), kNaN);
   for (Index q = 0; q < values.size() && answer.ok; ++q)
-    values(q) = (this->*measure)(quantities_[static_cast<std::size_t>(q)], answer, exact);
+    values(q) = (this->*measure)(quantities_[static_cast<std::size_t>(q)], answer);
   return values;
 }
 

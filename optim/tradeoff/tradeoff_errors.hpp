@@ -34,7 +34,7 @@ struct Quantity {
   double scale = 1;        // divisor of the error
   double certificate = 0;  // difference of two methods in the same measure
 
-  bool is_doubtful() const { return certificate >= 1e-6; }  // 1e-9 and less are usual
+  bool is_uncertain() const { return certificate >= 1e-6; }  // 1e-9 and less are usual
 };
 
 class TradeoffErrors {
@@ -48,21 +48,17 @@ class TradeoffErrors {
   const std::vector<Quantity>& quantities() const { return quantities_; }
   // The largest distance of the motion from its start [m], and whether that is more than rounding.
   double extent() const { return distance_.extent(exact_.motion, exact_.y_initial); }
-  bool moves() const { return quantities_.front().relative || quantities_.front().is_doubtful(); }
+  bool moves() const { return quantities_.front().relative || quantities_.front().is_uncertain(); }
   // One error per quantity; NaN if the answer does not contain it.
-  Eigen::VectorXd of(const Answer& answer) const { return of(answer, exact_); }
-  // With the same scales, against another answer.
-  Eigen::VectorXd of(const Answer& answer, const Answer& exact) const {
-    return each(&TradeoffErrors::error, answer, exact);
-  }
+  Eigen::VectorXd of(const Answer& answer) const { return each(&TradeoffErrors::error, answer); }
   // Likewise the deviations; NaN for the motion and the sensors, which have no single sign.
-  Eigen::VectorXd deviations(const Answer& answer) const { return each(&TradeoffErrors::deviation, answer, exact_); }
+  Eigen::VectorXd deviations(const Answer& answer) const { return each(&TradeoffErrors::deviation, answer); }
 
  private:
-  using Measure = double (TradeoffErrors::*)(const Quantity& quantity, const Answer& answer, const Answer& exact) const;
-  double error(const Quantity& quantity, const Answer& answer, const Answer& exact) const;
-  double deviation(const Quantity& quantity, const Answer& answer, const Answer& exact) const;
-  Eigen::VectorXd each(Measure measure, const Answer& answer, const Answer& exact) const;
+  using Measure = double (TradeoffErrors::*)(const Quantity& quantity, const Answer& answer) const;
+  double error(const Quantity& quantity, const Answer& answer) const;
+  double deviation(const Quantity& quantity, const Answer& answer) const;
+  Eigen::VectorXd each(Measure measure, const Answer& answer) const;
   bool is_known(double size, double apart) const { return size > clearly_ * apart; }
   bool has(const Quantity& quantity, const Answer& answer) const;
   double gradient_size(const Eigen::Ref<const Eigen::RowVectorXd>& gradient) const;

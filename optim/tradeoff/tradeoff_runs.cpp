@@ -59,13 +59,11 @@ GradientMethod TradeoffRuns::discrete_method() const {
   return cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
 }
 
-Answer TradeoffRuns::run(const SimulationSettings& given, const RunLimit& limit, const StepSequence* frozen,
-                         bool sampled) const {
+Answer TradeoffRuns::run(const SimulationSettings& given, const RunLimit& limit, bool sampled) const {
   return run_within(limit, [&](Answer& answer, const std::function<bool(double)>& go_on) {
     const SimulationSettings settings = integrated(given);
     const Eigen::VectorXd rho = parameter_values(scene_);
     RunOptions options;
-    options.frozen = frozen;
     options.progress = go_on;
     const Mechanism mechanism(scene_, rho, no_derivatives(scene_));
     const auto simulated = [&](std::span<const Cost> costs) {

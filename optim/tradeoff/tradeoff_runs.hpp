@@ -46,12 +46,11 @@ class TradeoffRuns {
 
   // psi alone, as a simulation computes it. This is timed.
   Answer values(const SimulationSettings& settings, const RunLimit& limit = {}) const {
-    return run(settings, limit, nullptr, false);
+    return run(settings, limit, false);
   }
-  // Adds the motion and the sensors at sample times. With frozen, it takes the steps of another run.
-  Answer motion(const SimulationSettings& settings, const RunLimit& limit = {},
-                const StepSequence* frozen = nullptr) const {
-    return run(settings, limit, frozen, true);
+  // Adds the motion and the sensors at sample times.
+  Answer motion(const SimulationSettings& settings, const RunLimit& limit = {}) const {
+    return run(settings, limit, true);
   }
   // psi and psi_rho in all parameters. The limit applies to the forward part.
   Answer gradients(const SimulationSettings& settings, GradientMethod method, const RunLimit& limit = {}) const;
@@ -63,7 +62,7 @@ class TradeoffRuns {
   GradientMethod discrete_method() const;                    // the cheaper one, tlm or adjoint
 
  private:
-  Answer run(const SimulationSettings& settings, const RunLimit& limit, const StepSequence* frozen, bool sampled) const;
+  Answer run(const SimulationSettings& settings, const RunLimit& limit, bool sampled) const;
 
   Scene scene_;
   std::vector<Objective> objectives_;

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <map>
-#include <utility>
 
 namespace mbsopt::inline optim {
 namespace {
@@ -15,11 +13,11 @@ namespace {
 // Returns the rows that cost less than every tighter one, in the same order. `some` goes from loose to tight.
 template <typename Cost>
 std::vector<std::size_t> not_dominated(const std::vector<std::size_t>& some, const Cost& cost_of) {
-  std::vector<std::size_t> kept;
+  std::vector<std::size_t> left;
   for (auto i = some.rbegin(); i != some.rend(); ++i)
-    if (kept.empty() || cost_of(*i) < cost_of(kept.back())) kept.push_back(*i);
-  std::ranges::reverse(kept);
-  return kept;
+    if (left.empty() || cost_of(*i) < cost_of(left.back())) left.push_back(*i);
+  std::ranges::reverse(left);
+  return left;
 }
 
 }  // namespace
@@ -90,14 +88,11 @@ std::vector<WorkPrecisionCurve> work_precision_curves(const std::vector<Tradeoff
         !better_than_zero(quantities[quantity], rows[i].bounds(static_cast<Eigen::Index>(quantity))))
       continue;
     auto curve = std::ranges::find(curves, setting.curve, &WorkPrecisionCurve::name);
-    if (curve == curves.end()) curve = curves.insert(curve, WorkPrecisionCurve{setting.curve, {}, {}});
+    if (curve == curves.end()) curve = curves.insert(curve, WorkPrecisionCurve{setting.curve, {}});
     curve->line.push_back(i);
   }
-  for (WorkPrecisionCurve& curve : curves) {
-    const std::vector<std::size_t> all = std::exchange(
-        curve.line, not_dominated(curve.line, [&](std::size_t i) { return rows[i].statistics.rhs_evaluations; }));
-    std::ranges::set_difference(all, curve.line, std::back_inserter(curve.beside));
-  }
+  for (WorkPrecisionCurve& curve : curves)
+    curve.line = not_dominated(curve.line, [&](std::size_t i) { return rows[i].statistics.rhs_evaluations; });
   return curves;
 }
 

@@ -85,13 +85,14 @@ void mark_fronts(std::vector<TradeoffRow>& rows, const std::vector<Quantity>& qu
 // below 1.
 bool better_than_zero(const Quantity& quantity, double error);
 
-// Indices of rows from loose to tight; only rows whose bound is better than zero.
+// A curve of one quantity: indices of rows from loose to tight, whose bounds are better than zero. Right-hand sides
+// grow along it, and bounds fall or stay: it leaves out rows that a tighter one dominates with no more right-hand
+// sides.
 struct WorkPrecisionCurve {
   std::string name;
-  std::vector<std::size_t> line;    // right-hand sides grow, bounds fall or stay
-  std::vector<std::size_t> beside;  // dominated: a tighter setting needed no more right-hand sides
+  std::vector<std::size_t> line;
 };
-// The curves of one quantity. Settings that stand alone have none.
+// Settings that stand alone have none.
 std::vector<WorkPrecisionCurve> work_precision_curves(const std::vector<TradeoffRow>& rows,
                                                       const std::vector<Quantity>& quantities, std::size_t quantity);
 

@@ -223,29 +223,6 @@ TEST_CASE("tradeoff passes on the warnings of the file's settings, and doubts th
   CHECK_THAT(err.str(), Contains("reference, gauss6 at rtol 1e-07 [####"));
 }
 
-TEST_CASE("tradeoff --alpha: model error, rounding and drift of the penalty form", "[command]") {
-#ifdef __SANITIZE_ADDRESS__
-  return;  // twenty times slower
-#endif
-  const TemporaryFolder folder;
-  const std::string file = folder.write("rod.json", kPendulum);
-  const CommandOutcome outcome =
-      run_command({"tradeoff", file, "--alpha", "1e4:1e7", "--budget", "3600", "--out", folder.file("out"), "--quiet"});
-  INFO(outcome.out << outcome.err);
-  REQUIRE(outcome.exit_code == kDone);
-  const Csv csv = csv_of(folder.path / "out/tradeoff.csv");
-  CHECK(csv.lines.size() == 4);
-  const auto rows = json_of(folder.path / "out/result.json").at("penalty").at("rows");
-  REQUIRE(rows.size() == 4);
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    const auto model = [&](std::size_t k) { return rows[k].at("acceleration").at("model_error").get<double>(); };
-    CHECK(model(i - 1) / model(i) == Approx(10).epsilon(0.2));
-    CHECK(rows[i].at("quasidefinite").at("drift").get<double>() <
-          rows[i - 1].at("quasidefinite").at("drift").get<double>());
-  }
-  CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("rounding by Cholesky"));
-}
-
 TEST_CASE("tradeoff: a file without objectives is measured by its sensors and its motion", "[command]") {
 #ifdef __SANITIZE_ADDRESS__
   return;  // twenty times slower
@@ -266,12 +243,8 @@ TEST_CASE("tradeoff: a file without objectives is measured by its sensors and it
 TEST_CASE("tradeoff: options that make no sense are bad input", "[command]") {
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kPendulum);
-  const std::vector<std::vector<std::string>> wrong{{"--alpha", "much"},
-                                                    {"--alpha", "1e9:1e2"},
-                                                    {"--alpha", "1e2:1e9", "--apply", "1e-4"},
-                                                    {"--budget", "0", "--apply", "1e-4"},
-                                                    {"--budget", "-1"},
-                                                    {"--apply", "0"}};
+  const std::vector<std::vector<std::string>> wrong{
+      {"--budget", "0", "--apply", "1e-4"}, {"--budget", "-1"}, {"--apply", "0"}};
   for (const std::vector<std::string>& options : wrong) {
     std::vector<std::string> arguments{"tradeoff", file, "--out", folder.file("out")};
     arguments.insert(arguments.end(), options.begin(), options.end());

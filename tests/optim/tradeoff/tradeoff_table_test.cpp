@@ -76,7 +76,6 @@ TEST_CASE("a work-precision line leaves out what a tighter setting dominates and
   const std::vector<WorkPrecisionCurve> relative = work_precision_curves(rows, quantities(true), 0);
   REQUIRE(relative.size() == 1);  // of `b` nothing is left
   CHECK(relative[0].line == std::vector<std::size_t>{3, 5, 6});
-  CHECK(relative[0].beside == std::vector<std::size_t>{2, 4});
   // Of a line a plot over time connects what no tighter setting was as fast as; the line itself is no matter of time.
   rows[3].wall_seconds = 0.2, rows[5].wall_seconds = 0.1, rows[6].wall_seconds = 0.3;
   CHECK(slower_and_slower(rows, relative[0].line) == std::vector<std::size_t>{5, 6});
