@@ -60,7 +60,7 @@ def print_parts(results, more=()):
         print(f"{words}: parts are at most {apart:.2f} combined standard errors apart; each interval "
               f"{'holds' if held else 'does not hold'} the values of all parts")
     for (start, end), result in results.items():
-        print(f"{start} to {end} s: {result['identifiability']['in_words']}")
+        print(f"{start} to {end} s: condition number {result['identifiability']['condition_number']:.3g}")
 
 
 def main():

@@ -85,14 +85,8 @@ void design_options(CLI::App& sub, CommandOptions& options) {
 
 void identify_options(CLI::App& sub, CommandOptions& options) {
   problem_options(sub, options);
-  sub.add_option("--profile", options.profiles, "profile likelihood of fitted parameters: k1,run1.theta0")
-      ->delimiter(',')
-      ->type_name("NAME,...");
   sub.add_flag("--preflight", options.preflight, "say what the data hold and would determine, and fit nothing");
   sub.add_option("--recover", options.recover, "known-truth recovery: number of simulated records to fit")
-      ->check(CLI::Range(2, 1'000'000));
-  sub.add_option("--bootstrap", options.bootstrap,
-                 "bootstrap intervals: number of records with resampled residuals to fit")
       ->check(CLI::Range(2, 1'000'000));
   add_keep_journal(sub, options);
 }
@@ -159,7 +153,7 @@ constexpr std::array kCommands{
     Command{"design", "optimal design", design_command, design_options,
             "problems/five_bar/design.json --out out/first_try"},
     Command{"identify", "fit parameters to measurements", identify_command, identify_options,
-            "problems/pendulum/identify.json --profile J,k"},
+            "problems/pendulum/identify.json --recover 20"},
     Command{"tradeoff", "error against cost for integrators, tolerances, formulations and gradient methods",
             tradeoff_command, tradeoff_options, "problems/five_bar/design.json --budget 20"},
     Command{"sweep", "objectives over a grid, samples or a list of parameter values", sweep_command, sweep_options,

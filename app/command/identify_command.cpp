@@ -29,7 +29,6 @@
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/fit_start.hpp"
 #include "optim/fit/identification.hpp"
-#include "optim/fit/profile_likelihood.hpp"
 #include "optim/fit/recovery.hpp"
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/fit/windows.hpp"
@@ -59,7 +58,7 @@ IdentificationOptions simulating(Run& run) {
   return options;
 }
 
-// Residuals at points of the fit, which statistics and profiles ask for again.
+// Residuals at points of the fit, which statistics ask for again.
 class KnownResiduals : public ResidualRecords {
  public:
   bool recall(const Asked& asked, Experiment::Residuals& found) override {
@@ -87,7 +86,6 @@ IdentificationResult fitted(LongRun& long_run, const Problem& problem, const std
   KnownResiduals known;
   options.records = &known;
   options.threads = case_threads(run);
-  options.profiles = run.context.options.profiles;
   options.simulation_progress = fit_progress(run);
   options.progress = [&](const FitRow& row) {
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.6e}   gradient {:.1e}   step {:.1e}   {}",
@@ -97,52 +95,37 @@ IdentificationResult fitted(LongRun& long_run, const Problem& problem, const std
         {{"iteration", row.iteration}, {"cost", row.cost}, {"parameters", entries_of(row.parameters)}});
     return !interrupted();
   };
-  options.profile_progress = [&](const std::string& name, double value, double tau) {
-    run.progress.iteration(fmt::format("profile of {}   {:.6g}   tau {:+.3f}", name, value, tau));
-    return !interrupted();
-  };
   IdentificationResult fit = run_identification(problem, data, options);
   run.progress.finish();
   if (run.problem.identification->multistart) describe_given(given, fit);
   return fit;
 }
 
-Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& fit, bool bootstrap) {
-  const std::string name = bootstrap ? "bootstrap" : "recovery";
+// Fits simulated records, as the command line requests.
+void add_recovery(Run& run, const CutProblem& cut, const IdentificationResult& fit) {
   RecoveryOptions options;
-  options.bootstrap = bootstrap, options.threads = case_threads(run);
-  options.seeds = bootstrap ? run.context.options.bootstrap : run.context.options.recover;
+  options.threads = case_threads(run);
+  options.seeds = run.context.options.recover;
   options.simulation_progress = fit_progress(run);
   options.progress = [&](int done) {
-    run.progress.iteration(fmt::format("{}   {} of {}", name, done, options.seeds));
+    run.progress.iteration(fmt::format("recovery   {} of {}", done, options.seeds));
     return !interrupted();
   };
-  Recovery recovery = recover(cut.problem, cut.data, fit, options);
+  const Recovery recovery = recover(cut.problem, cut.data, fit, options);
   run.progress.finish();
   if (recovery.failed > 0)
-    run.warn(fmt::format("--{}: {} of {} fits of simulated records failed", bootstrap ? name : "recover",
-                         recovery.failed, recovery.failed + recovery.fits));
-  return recovery;
+    run.warn(fmt::format("--recover: {} of {} fits of simulated records failed", recovery.failed,
+                         recovery.failed + recovery.fits));
+  show_recovery(run, recovery);
 }
 
-// Recovers and draws again a converged fit, as the command line requests.
-void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit) {
-  const CommandOptions& options = run.context.options;
-  if (options.recover > 0 && !interrupted()) {
-    show_recovery(run, recovered(run, cut, fit, false));
-  }
-  if (options.bootstrap > 0 && !interrupted()) {
-    show_bootstrap(run, fit, recovered(run, cut, fit, true));
-  }
-}
-
-// Residuals at the initial values, whose derivatives are doubted on the way; for --preflight with what the data
-// determine there.
+// Residuals at the initial values, with warnings of wrong derivatives; for --preflight with what the data determine
+// there.
 IdentificationResult at_start(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
   IdentificationOptions options;
   options.threads = case_threads(run), options.simulation_progress = [](double) { return !interrupted(); };
   FitStart start = start_of_fit(needed, data, options);
-  run.warn(start.doubts);
+  run.warn(start.warnings);
   if (!run.context.options.preflight) return std::move(start.residuals);
   options = simulating(run), options.preflight = true;
   start.residuals = run_identification(needed, data, options);
@@ -150,7 +133,8 @@ IdentificationResult at_start(Run& run, const Problem& needed, const std::vector
   return std::move(start.residuals);
 }
 
-void say_channels(Run& run, const Problem& cut, const std::vector<CsvTable>& data, const IdentificationResult& start) {
+void show_channel_data(Run& run, const Problem& cut, const std::vector<CsvTable>& data,
+                       const IdentificationResult& start) {
   std::vector<ChannelData> channels = channel_data(cut, data);
   add_residuals(channels, cut, start);
   run.context.out << '\n' << channel_table(channels);
@@ -277,14 +261,11 @@ int identify_command(const CommandContext& context) {
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(cut.problem, &left_out);
   say_left_out(run, left_out, "measurement");
-  if (!context.options.profiles.empty())  // before anything is fitted
-    profiled_unknowns(context.options.profiles,
-                      names_of(unknowns_of_fit(needed.scene, *needed.identification), *needed.identification));
   if (context.options.preflight) run.warn(cut.warnings);  // a fit cuts again, at the best start, and warns then
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   const IdentificationResult start = at_start(run, needed, data);
-  say_channels(run, needed, data, start);
+  show_channel_data(run, needed, data, start);
   if (context.options.preflight) return preflight(run, start);
   LongRun long_run(run);
   const BestStart best = from_best_start(long_run, whole);
@@ -303,8 +284,7 @@ int identify_command(const CommandContext& context) {
   run.write("optimized.json", optimized_problem_text(run, new_values(fit)));
   run.write("history.csv", to_csv(history));
   run.write("residuals.csv", residuals_csv(fit));
-  if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
-  if (fit.ok()) examine(run, cut, fit);
+  if (fit.ok() && context.options.recover > 0 && !interrupted()) add_recovery(run, cut, fit);
   const Problem explained = with_fitted_values(needed, fit);
   std::optional<SimulatedExperiment> after;
   if (!interrupted() && before.simulation.ok()) after = simulated_experiment(run, simulated_scene(explained, data));

@@ -6,24 +6,14 @@
 namespace mbsopt::inline app {
 namespace {
 
-constexpr std::array kOrder{"program",         "version",
-                            "command",         "problem",
-                            "status",          "message",
-                            "last_good_time",  "machine",
-                            "model",           "accuracy",
-                            "simulation",      "objectives",
-                            "methods",         "hessian_method",
-                            "verdict",         "reference",
-                            "settings",        "fit",
-                            "recommendations", "task_recommendations",
-                            "applied",         "skipped",
-                            "parameters",      "experiments",
-                            "correlation",     "covariance",
-                            "profiles",        "recovery",
-                            "bootstrap",       "statistics",
-                            "multistart",      "optimizer",
-                            "identifiability", "provenance",
-                            "warnings"};
+constexpr std::array kOrder{
+    "program",         "version",        "command",    "problem",         "status",
+    "message",         "last_good_time", "machine",    "model",           "accuracy",
+    "simulation",      "objectives",     "methods",    "hessian_method",  "verdict",
+    "reference",       "settings",       "fit",        "recommendations", "task_recommendations",
+    "applied",         "skipped",        "parameters", "experiments",     "correlation",
+    "covariance",      "recovery",       "statistics", "multistart",      "optimizer",
+    "identifiability", "provenance",     "warnings"};
 
 }  // namespace
 

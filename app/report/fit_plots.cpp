@@ -67,7 +67,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTabl
   return plots;
 }
 
-constexpr std::size_t kFewest = 20;  // samples, below which a histogram says nothing
+constexpr std::size_t kFewest = 20;  // samples, below which an autocorrelation says nothing
 
 constexpr std::size_t kInitialColour = 5, kBandColour = 4;
 
@@ -84,33 +84,6 @@ bool is_comparable(const std::vector<double>& initial, const std::vector<double>
     return largest;
   };
   return !initial.empty() && size(initial) < kFar * size(measured);
-}
-
-// The shares of the residuals in bins of half a sigma within four; the outermost bins count those beyond. The curve is
-// the normal distribution.
-LinePlot histogram(const FitPlot& fit) {
-  constexpr double kWidth = 0.5, kEnd = 4;
-  constexpr int kBins = 16;
-  PlotSeries found{"share of the residuals", {}, {}, Mark::bars, {}, data_colour(fit)},
-      normal{"normal distribution", {}, {}, Mark::line};
-  std::vector<double> share(kBins, 0.0);
-  const auto samples =
-      static_cast<double>(std::ranges::count_if(fit.residual, [](double z) { return std::isfinite(z); }));
-  for (const double z : fit.residual) {
-    if (!std::isfinite(z)) continue;
-    const double bin = std::clamp(std::floor((z + kEnd) / kWidth), 0.0, kBins - 1.0);
-    share[static_cast<std::size_t>(bin)] += 1 / samples;
-  }
-  for (int k = 0; k < kBins; ++k) {
-    const double z = -kEnd + (k + 0.5) * kWidth;
-    found.x.push_back(z), found.y.push_back(share[static_cast<std::size_t>(k)]);
-    const auto below = [](double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); };
-    normal.x.push_back(z), normal.y.push_back(below(z + kWidth / 2) - below(z - kWidth / 2));
-  }
-  return {.title = fmt::format("{}: histogram of the residuals of {}", fit.experiment, fit.channel),
-          .x_label = "(measured - model)/sigma [-]",
-          .y_label = "share per half sigma [-]",
-          .series = {found, normal}};
 }
 
 // r_k = sum_i z_i z_{i+k} / sum_i z_i^2 about the mean, without pairs across a gap. White noise has 95 % within
@@ -168,9 +141,7 @@ void add_fit(RunPage& page, const FitPlot& fit) {
                     .y_label = "(measured - model)/sigma [-]"};
   residual.series.push_back({"residual", fit.times, fit.residual, Mark::points, {}, data});
   page.plot(residual);
-  if (fit.residual.size() < kFewest) return;
-  page.plot(histogram(fit));
-  page.plot(autocorrelation(fit));
+  if (fit.residual.size() >= kFewest) page.plot(autocorrelation(fit));
 }
 
 }  // namespace

@@ -1,11 +1,8 @@
 #include "app/report/identification_page.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cmath>
 #include <utility>
 
@@ -54,14 +51,6 @@ void add_outcome(RunPage& page, const IdentificationResult& fit) {
                         {"after, with the same sigmas", significant(fit.cost_final)},
                         {"condition number", significant(s.condition_number, 3)}});
   if (!s.none.empty()) page.paragraph(fmt::format("There are no standard errors and intervals: {}.", s.none));
-  if (s.singular_values.size() > 0 && fit.parameters.size() > 1) {
-    std::string words = determined_in_words(fit);
-    words.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(words.front())));
-    page.paragraph(words + ".");
-    page.note(
-        "Singular values of the sensitivities, with the effect of each parameter scaled to 1: the nearer to 0, the "
-        "less a combination of parameters shows in the data.");
-  }
   for (const std::string& words : s.unidentifiable) page.paragraph("Not determined by the data: " + words);
 }
 
@@ -128,53 +117,27 @@ void show_parameters(RunPage& page, const IdentificationResult& fit) {
 
 void show_channels(RunPage& page, const IdentificationResult& fit) {
   TextTable channels({"experiment", "role", "channel", "samples", "rms", "sigma", "unit", "rms/sigma", "lag-1",
-                      "Ljung-Box p", "runs p", "residuals"}),
-      fits({"experiment", "channel", "role", "samples", "rms of measured - model", "sigma", "unit", "rms/sigma"}),
-      tests({"experiment", "channel", "mean", "lag-1 autocorrelation", "Ljung-Box", "lags", "its p", "runs of signs",
-             "their p", "in words"});
+                      "Ljung-Box p", "runs p", "residuals"});
   for (const ExperimentFit& e : fit.experiments) {
     for (const ChannelFit& c : e.channels) {
       const ResidualAnalysis& a = c.analysis;
-      const std::string role = e.validate ? "validate" : "fit", samples = std::to_string(c.samples),
-                        rms = significant(c.rms, 4), scaled = significant(c.rms_scaled, 4), words = a.in_words(),
-                        sigma = significant(c.sigma, 4) + (c.sigma_is_estimated ? " (estimated)" : ""),
-                        box_p = significant(a.ljung_box_p, 2), runs_p = significant(a.runs_p, 2);
-      channels.add({e.name, role, c.column, samples, rms, sigma, c.unit, scaled,
-                    fmt::format("{:.2f}", a.autocorrelation), box_p, runs_p, words});
-      fits.add({e.name, c.column, role, samples, rms, sigma, c.unit, scaled});
-      tests.add({e.name, c.column, significant(a.mean, 3), significant(a.autocorrelation, 3),
-                 significant(a.ljung_box, 3), std::to_string(a.lags), box_p, std::to_string(a.runs), runs_p, words});
+      channels.add({e.name, e.validate ? "validate" : "fit", c.column, std::to_string(c.samples), significant(c.rms, 4),
+                    significant(c.sigma, 4) + (c.sigma_is_estimated ? " (estimated)" : ""), c.unit,
+                    significant(c.rms_scaled, 4), fmt::format("{:.2f}", a.autocorrelation),
+                    significant(a.ljung_box_p, 2), significant(a.runs_p, 2), a.in_words()});
     }
   }
-  page.print(channels);
   page.heading("Measured and model");
-  page.table(fits);
+  page.both(channels);
   page.heading("Are the residuals noise?");
   page.paragraph(
       fmt::format("For white noise p is below 0.01 in one of a hundred tests; here there are {}. Where p is far below, "
                   "the model misses something. {}",
-                  2 * tests.rows().size(),
+                  2 * channels.rows().size(),
                   fit.statistics.covariance_type == CovarianceType::white
                       ? "Then the standard errors, which take the residuals for white, are too small."
                       : "The standard errors allow for residuals that are correlated in time, but not "
                         "for a wrong model."));
-  page.table(tests);
-}
-
-// The experiments that a parameter depends on most, by more than a standard error.
-void print_influences(std::ostream& out, const IdentificationResult& fit) {
-  constexpr std::size_t kInfluences = 3;
-  std::vector<const ExperimentFit*> strong;
-  const auto size = [](const ExperimentFit* e) { return std::abs(e->influence->change); };
-  for (const ExperimentFit& e : fit.experiments)
-    if (e.influence && size(&e) > 1) strong.push_back(&e);
-  std::ranges::stable_sort(strong, std::ranges::greater(), size);
-  if (strong.size() > kInfluences) strong.resize(kInfluences);
-  for (const ExperimentFit* e : strong)
-    out << (std::isinf(e->influence->change)
-                ? fmt::format("without {}, {} is not determined\n", e->name, e->influence->parameter)
-                : fmt::format("without {}, {} would change by {:.2g} standard errors\n", e->name,
-                              e->influence->parameter, e->influence->change));
 }
 
 // The terminal shows the strong ones if there are many.
@@ -209,39 +172,6 @@ void show_correlation(RunPage& page, const IdentificationResult& fit) {
   if (shown < all) page.note(fmt::format("The first {} of {} parameters are drawn.", shown, all));
 }
 
-void show_profiles(RunPage& page, const IdentificationResult& fit) {
-  if (fit.profiles.empty()) return;
-  page.heading("Profile likelihood");
-  page.paragraph(
-      "The parameter is held, all others are fitted again. Where the model is linear in it, tau is a straight line.");
-  TextTable table({"profile", "95 % interval", "points"});
-  const auto end_of = [](const std::optional<double>& end) { return end ? significant(*end) : "-"; };
-  for (const ParameterProfile& p : fit.profiles)
-    table.add({p.name, fmt::format("[{}, {}]", end_of(p.lower), end_of(p.upper)), std::to_string(p.points.size())});
-  page.both(table);
-  for (const ParameterProfile& p : fit.profiles) {
-    if (!p.lower) page.say(fmt::format("{}: no lower end: {}", p.name, p.below));
-    if (!p.upper) page.say(fmt::format("{}: no upper end: {}", p.name, p.above));
-  }
-  for (const ParameterProfile& p : fit.profiles) {
-    if (p.points.empty()) continue;
-    const auto parameter = std::ranges::find(fit.parameters, p.name, &FittedParameter::name);
-    const std::string unit = parameter == fit.parameters.end() ? "" : parameter->unit;
-    LinePlot plot{.title = "Profile of " + p.name,
-                  .x_label = unit.empty() ? p.name : fmt::format("{} [{}]", p.name, unit),
-                  .y_label = "tau [-]"};
-    PlotSeries& series = plot.series.emplace_back(PlotSeries{"tau", {}, {}});
-    for (const ParameterProfile::Point& point : p.points)
-      series.x.push_back(point.value), series.y.push_back(point.tau);
-    // Marks the place where tau reaches an end of the interval.
-    for (const std::optional<double>& end : {p.lower, p.upper}) {
-      const auto at = end ? std::ranges::find(p.points, *end, &ParameterProfile::Point::value) : p.points.end();
-      if (at != p.points.end()) plot.limits.push_back({end == p.lower ? "" : "95 %", at->tau, at->tau > 0});
-    }
-    page.plot(plot);
-  }
-}
-
 }  // namespace
 
 void show_fit(RunPage& page, const IdentificationResult& fit, const std::string& effort) {
@@ -253,9 +183,6 @@ void show_fit(RunPage& page, const IdentificationResult& fit, const std::string&
   show_parameters(page, fit);
   show_channels(page, fit);
   show_correlation(page, fit);
-  show_profiles(page, fit);
-  print_influences(out, fit);
-  if (fit.parameters.size() > 1) out << '\n' << determined_in_words(fit) << '\n';
   for (const std::string& words : s.unidentifiable) out << "not determined by the data: " << words << '\n';
   if (!s.none.empty()) out << fmt::format("no standard errors and intervals: {}\n", s.none);
   out << '\n';

@@ -19,29 +19,27 @@ struct Ranks;
 
 struct CommandOptions {
   std::string problem_file;
-  std::string starter;                // of new: its kind
-  std::string out;                    // --out; empty: out/<name>/
-  std::vector<std::string> sets;      // --set, each "path=value"
-  std::string method = "auto";        // --method of gradient
-  bool hessian = false;               // --hessian of gradient
-  std::vector<std::string> profiles;  // --profile of identify: fitted parameters
-  bool preflight = false;             // --preflight of identify: no fit
-  int recover = 0;                    // --recover of identify: fits of simulated records
-  int bootstrap = 0;                  // --bootstrap of identify: fits of resampled residuals
-  double budget = 60;                 // --budget of tradeoff [s]
-  std::optional<double> apply;        // --apply of tradeoff: the accuracy wanted
-  std::optional<double> at;           // --at of linearise [s]
-  std::vector<std::string> inputs;    // --inputs of linearise: parameters
-  std::vector<std::string> outputs;   // --outputs of linearise: sensors; empty: all
-  SweepOptions sweep;                 // --vary, --samples, --seed, --points, --gradients of sweep
-  bool mat = false;                   // --mat of simulate and kinematics: trajectory.mat
-  bool sensitivities = false;         // --sensitivities of simulate: sensitivities.csv
-  int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
-  bool quiet = false;                 // --quiet
-  bool allow_plugins = false;         // --allow-plugins
-  bool json = false;                  // --json: only result.json on standard output
-  bool keep_journal = false;          // --keep-journal of design, identify and sweep
-  bool resume = false;                // continue with the journal in `out`
+  std::string starter;               // of new: its kind
+  std::string out;                   // --out; empty: out/<name>/
+  std::vector<std::string> sets;     // --set, each "path=value"
+  std::string method = "auto";       // --method of gradient
+  bool hessian = false;              // --hessian of gradient
+  bool preflight = false;            // --preflight of identify: no fit
+  int recover = 0;                   // --recover of identify: fits of simulated records
+  double budget = 60;                // --budget of tradeoff [s]
+  std::optional<double> apply;       // --apply of tradeoff: the accuracy wanted
+  std::optional<double> at;          // --at of linearise [s]
+  std::vector<std::string> inputs;   // --inputs of linearise: parameters
+  std::vector<std::string> outputs;  // --outputs of linearise: sensors; empty: all
+  SweepOptions sweep;                // --vary, --samples, --seed, --points, --gradients of sweep
+  bool mat = false;                  // --mat of simulate and kinematics: trajectory.mat
+  bool sensitivities = false;        // --sensitivities of simulate: sensitivities.csv
+  int threads = 0;                   // --threads, also worker processes; 0: as many as the machine has
+  bool quiet = false;                // --quiet
+  bool allow_plugins = false;        // --allow-plugins
+  bool json = false;                 // --json: only result.json on standard output
+  bool keep_journal = false;         // --keep-journal of design, identify and sweep
+  bool resume = false;               // continue with the journal in `out`
 };
 
 struct CommandContext {

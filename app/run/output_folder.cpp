@@ -17,9 +17,8 @@ namespace fs = std::filesystem;
 namespace {
 
 // journal.jsonl is not among them: the journal itself replaces no foreign file (journal.hpp).
-constexpr std::array kOutputs{"result.json",    "trajectory.csv",   "drives.csv",    "report.html",
-                              "optimized.json", "history.csv",      "residuals.csv", "profile.csv",
-                              "tradeoff.csv",   "recommended.json", "sweep.csv"};
+constexpr std::array kOutputs{"result.json", "trajectory.csv", "drives.csv",   "report.html",      "optimized.json",
+                              "history.csv", "residuals.csv",  "tradeoff.csv", "recommended.json", "sweep.csv"};
 
 // Makes a folder's name from a problem's: no separators, no leading dot, no control characters.
 std::string folder_name(std::string name) {

@@ -25,10 +25,6 @@ double student_quantile(double degrees_of_freedom, double probability) {
   return quantile(StudentsT(degrees_of_freedom), probability);
 }
 
-double chi_squared_quantile(double degrees_of_freedom, double probability) {
-  return quantile(ChiSquared(degrees_of_freedom), probability);
-}
-
 double chi_squared_tail(double degrees_of_freedom, double x) {
   return cdf(complement(ChiSquared(degrees_of_freedom), x));
 }

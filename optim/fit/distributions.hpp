@@ -5,7 +5,6 @@ namespace mbsopt::inline optim {
 
 double normal_quantile(double probability);
 double student_quantile(double degrees_of_freedom, double probability);
-double chi_squared_quantile(double degrees_of_freedom, double probability);
 
 // The probability of a value above x.
 double chi_squared_tail(double degrees_of_freedom, double x);

@@ -20,7 +20,7 @@
 
 namespace mbsopt::inline optim {
 
-// Keeps the residuals of a fit, so that statistics and profiles simulate no point again.
+// Keeps the residuals of a fit, so that statistics simulate no point again.
 struct ResidualRecords {
   struct Asked {
     std::size_t experiment;  // in the identification

@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <utility>
-
-#include "optim/fit/experiment_influence.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
@@ -139,18 +136,18 @@ std::vector<FittedParameter> described(const FitContext& fit, const ExperimentSt
     f.at_lower = touches(p.lower), f.at_upper = touches(p.upper);
     if (statistics.std_error.size() > k) {
       f.std_error = statistics.std_error(k);
-      set_interval(f, statistics.ci95(k, 1) - values(k), p.scale == ParameterScale::log);
+      const double half = f.std_error == 0 ? 0 : statistics.quantile * f.std_error;
+      set_interval(f, half, p.scale == ParameterScale::log);
     }
     fitted.push_back(std::move(f));
   }
   return fitted;
 }
 
-void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance,
-             std::size_t first) {
+void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& variances, std::size_t first) {
   const FitStatistics& s = fit.result.statistics;
   if (!s.none.empty() || fit.options.preflight) return;
-  const Eigen::VectorXd variances = (J * covariance).cwiseProduct(J).rowwise().sum(), sigma = stack.sigma();
+  const Eigen::VectorXd sigma = stack.sigma();
   for (Eigen::Index i = 0; i < sigma.size(); ++i) {
     ResidualRow& row = fit.result.residuals[first + static_cast<std::size_t>(i)];
     row.prediction = s.quantile * sigma(i) * std::sqrt(s.variance + variances(i));
@@ -158,26 +155,6 @@ void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixX
     if (std::isnan(channel.within_prediction)) channel.within_prediction = 0;
     if (std::abs(row.measured - row.model) <= row.prediction)
       channel.within_prediction += 1 / static_cast<double>(channel.samples);
-  }
-}
-
-void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastSquaresResult& solution) {
-  const FitStatistics& s = fit.result.statistics;
-  const bool determined = s.none.empty() && s.unidentifiable.empty();
-  const bool shares = std::ranges::any_of(stack.unknowns(), &UnknownParameter::shared);
-  if (stack.members().size() < 2 || stack.equalities > 0 || !determined || !shares || fit.options.preflight) return;
-  const Eigen::VectorXd errors = s.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
-  std::vector<std::size_t> each(stack.members().size());
-  std::iota(each.begin(), each.end(), std::size_t{0});
-  const std::vector<OthersWithout> others = others_without(stack, solution, each);
-  for (std::size_t m = 0; m < others.size(); ++m) {
-    std::optional<Influence>& most = fit.result.experiments[stack.members()[m].experiment].influence;
-    for (Eigen::Index k = 0; k < errors.size(); ++k) {
-      const UnknownParameter& unknown = stack.unknowns()[static_cast<std::size_t>(k)];
-      const double change = others[m].change(k) / errors(k);
-      if (unknown.shared && std::isfinite(errors(k)) && (!most || std::abs(change) > std::abs(most->change)))
-        most = {unknown.description.name, change};
-    }
   }
 }
 

@@ -1,4 +1,4 @@
-// Assesses a solution: scores, statistics, intervals of prediction, influences of experiments, criteria of likelihood.
+// Assesses a solution: scores, statistics, intervals of prediction, criteria of likelihood.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,11 +29,8 @@ std::vector<FittedParameter> described(const FitContext& fit, const ExperimentSt
 
 // Sets the half-widths of the 95 % intervals for one more measurement: Seber and Wild, "Nonlinear Regression" (1989),
 // section 5.1.1. The rows of residuals of these samples begin at `first`:
-//   t sigma sqrt(v + j covariance j'),   j = dz/drho
-void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance,
-             std::size_t first);
-
-void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastSquaresResult& solution);
+//   t sigma sqrt(v + variance),   variance = j covariance j' of the model's value, j = dz/drho
+void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& variances, std::size_t first);
 
 // sigmas: how many were estimated.
 void compare_by_likelihood(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& z, std::size_t sigmas);

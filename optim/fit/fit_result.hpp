@@ -43,12 +43,6 @@ struct ChannelFit {
   std::size_t beyond_scale = 0;  // samples with |z| above the scale of the loss, which count for less than their square
 };
 
-// The shared parameter that would change most without an experiment, to first order.
-struct Influence {
-  std::string parameter;
-  double change = 0;  // in its standard errors; infinite where the other experiments do not determine it
-};
-
 struct ExperimentFit {
   std::string name;
   std::optional<WindowOrigin> window;  // where it is one
@@ -57,10 +51,8 @@ struct ExperimentFit {
   std::size_t samples = 0;
   double rms = 0;  // of measured - model over all its channels: of one quantity only if these have one unit
   std::vector<ChannelFit> channels;
-  std::optional<Influence> influence;         // fit: of several experiments, where there are standard errors
-  std::vector<FittedParameter> refitted;      // validate: its free parameters
-  std::optional<double> rms_scaled_at_start;  // validate: of z with the shared parameters as at the start
-  std::string message;                        // validate: how the refit ended
+  std::vector<FittedParameter> refitted;  // validate: its free parameters
+  std::string message;                    // validate: how the refit ended
 };
 
 // A row of residuals.csv.
@@ -82,17 +74,6 @@ struct FitRow {
   long simulations = 0;        // so far
 };
 
-struct ParameterProfile {
-  struct Point {
-    double value = 0, cost = 0, tau = 0;
-    Eigen::VectorXd parameters;  // all, in the order of IdentificationResult::parameters
-  };
-  std::string name;                    // "k1", "run1.theta0"
-  std::vector<Point> points;           // by rising value
-  std::optional<double> lower, upper;  // of the 95 % interval
-  std::string below, above;            // why there is none
-};
-
 struct IdentificationResult {
   SolverStatus status = SolverStatus::failed;
   std::string message;  // in words, always
@@ -101,7 +82,6 @@ struct IdentificationResult {
   std::vector<ExperimentFit> experiments;
   std::vector<ResidualRow> residuals;  // by experiment, time, channel
   std::vector<FitRow> history;
-  std::vector<ParameterProfile> profiles;
   double cost_initial = 0, cost_final = 0;  // what is minimised, both by the loss and the sigmas of the end
   double aic = FitStatistics::kUnknown, bic = FitStatistics::kUnknown;  // of fits by the square
   std::vector<std::string> warnings;  // sentences, some after the path of what they are about
@@ -117,7 +97,6 @@ struct ResidualRecords;  // optim/fit/experiment_stack.hpp
 
 // Options of an identification that the problem does not give.
 struct IdentificationOptions {
-  std::vector<std::string> profiles;  // names of fitted parameters whose profile likelihood is wanted
   std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(const FitRow&)> progress;        // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
@@ -126,8 +105,6 @@ struct IdentificationOptions {
   bool tests_angles = true;            // fits again where a column may be in degrees
   int threads = 1;                     // experiments at a time; results do not depend on it
   ResidualRecords* records = nullptr;  // of the points that were simulated before
-  // After every point of a profile; false ends it there.
-  std::function<bool(const std::string& name, double value, double tau)> profile_progress;
 };
 
 }  // namespace mbsopt::inline optim

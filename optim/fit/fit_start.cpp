@@ -82,7 +82,7 @@ FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data,
   };
   const std::vector<std::string> differences = comparison.warnings();
   said.insert(said.end(), differences.begin(), differences.end());
-  if (!abandoned) start.doubts = std::move(said);
+  if (!abandoned) start.warnings = std::move(said);
   return start;
 }
 

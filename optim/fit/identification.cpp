@@ -14,9 +14,8 @@
 #include "optim/fit/distributions.hpp"
 #include "optim/fit/fit_assessment.hpp"
 #include "optim/fit/fit_context.hpp"
-#include "optim/fit/fit_doubts.hpp"
 #include "optim/fit/fit_search.hpp"
-#include "optim/fit/profile_likelihood.hpp"
+#include "optim/fit/fit_warnings.hpp"
 #include "optim/fit/validation.hpp"
 #include "optim/fit/windows.hpp"
 #include "optim/machine/stopwatch.hpp"
@@ -47,7 +46,7 @@ const IdentificationSpec& checked(const Problem& problem, const std::vector<CsvT
 struct Fit {
   IdentificationResult result = {};
   std::vector<ChannelRecord> records = {};
-  std::vector<AngleDoubt> angles = {};
+  std::vector<DegreesCandidate> angles = {};
 };
 
 class Identification {
@@ -56,7 +55,7 @@ class Identification {
       : fit_{problem.scene, checked(problem, data), data, options} {
     if (options.simulation_progress)
       fit_.go_on = [this](double t) {
-        const std::scoped_lock lock(told_);
+        const std::scoped_lock lock(progress_lock_);
         return fit_.abandoned = fit_.abandoned || !fit_.options.simulation_progress(t), !fit_.abandoned;
       };
   }
@@ -81,7 +80,6 @@ class Identification {
       throw std::invalid_argument(fmt::format("identification: {} cannot determine {}",
                                               counted(stack.samples(), "sample"),
                                               counted(stack.variables(), "parameter")));
-    const std::vector<Eigen::Index> profiled = profiled_unknowns(fit_.options.profiles, names_of(unknowns, fit_.spec));
     FitSearch search(fit_, stack);
     const LeastSquaresResult solution = search.solved();
     fit_.result.status = fit_.abandoned ? SolverStatus::stopped : solution.status;
@@ -99,10 +97,6 @@ class Identification {
     fit_.shared = parameter_values(fit_.scene);
     for (std::size_t i = 0; i < unknowns.size(); ++i)
       if (unknowns[i].shared) fit_.shared(unknowns[i].parameter) = fit_.result.parameters[i].value;
-    if (fit_.result.status == SolverStatus::converged)
-      for (const Eigen::Index k : profiled)
-        if (!fit_.abandoned) fit_.result.profiles.push_back(profile_of(fit_, stack, k, solution.x));
-    if (fit_.abandoned) fit_.result.status = SolverStatus::stopped, fit_.result.message = "stopped on request";
     fit_.result.simulations += stack.simulations();
   }
 
@@ -110,8 +104,7 @@ class Identification {
     score_all(fit_, stack, solution.point.z, fit_.sigmas_are_estimated);
     fit_.result.statistics = statistics_at(fit_, solution, stack);
     const Eigen::MatrixXd J = stack.z_rho(solution.point, solution.x).topRows(stack.samples());
-    predict(fit_, stack, J, fit_.result.statistics.covariance, 0);
-    find_influences(fit_, stack, solution);
+    predict(fit_, stack, (J * fit_.result.statistics.covariance).cwiseProduct(J).rowwise().sum(), 0);
     const std::size_t sigmas = fit_.sigmas_are_estimated ? SigmaEstimation(stack, fit_.spec).scale_groups().size() : 0;
     compare_by_likelihood(fit_, stack, solution.point.z, sigmas);
   }
@@ -151,15 +144,15 @@ class Identification {
           "identification.loss: {} of {} lie beyond its scale, {:g} sigma: these are no outliers. Sigma is too small, "
           "the model is wrong, or the fit ended in another minimum",
           beyond, counted(stack.samples(), "sample"), stack.loss.s()));
-    doubt_sigmas();
+    check_known_sigma();
     records_ = channel_records(fit_, stack);
     if (!fit_.options.preflight)
-      std::ranges::move(doubts_of_fit(fit_, records_, stack, solution), std::back_inserter(fit_.result.warnings));
-    if (fit_.options.tests_angles) angles_ = angle_doubts(fit_, records_, stack, at_start);
+      std::ranges::move(warnings_of_fit(fit_, records_, stack, solution), std::back_inserter(fit_.result.warnings));
+    if (fit_.options.tests_angles) angles_ = degrees_candidates(fit_, records_, stack, at_start);
   }
 
   // Intervals that rest on the given sigmas. Beyond a factor of 2 an interval of 95 % holds the truth in 67 % at most.
-  void doubt_sigmas() {
+  void check_known_sigma() {
     constexpr double kFactor = 2, kChance = 1e-3;  // of so large or small a sum of squares
     const FitStatistics& s = fit_.result.statistics;
     const bool by_sigmas = fit_.spec.sigma_is_known && s.variance == 1 && s.covariance_type == CovarianceType::white;
@@ -181,8 +174,8 @@ class Identification {
 
   FitContext fit_;
   std::vector<ChannelRecord> records_;
-  std::vector<AngleDoubt> angles_;
-  std::mutex told_;
+  std::vector<DegreesCandidate> angles_;
+  std::mutex progress_lock_;
 };
 
 Fit fit_of(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options) {
@@ -193,9 +186,9 @@ Fit fit_of(const Problem& problem, const std::vector<CsvTable>& data, const Iden
   return fit;
 }
 
-// Fits again with the likely columns in degrees, then with all doubted ones, which one logger wrote. Returns the doubts
-// about columns that are then explained better.
-std::vector<std::string> confirmed(const std::vector<AngleDoubt>& doubts, const Problem& problem,
+// Fits again with the likely columns in degrees, then with all candidates, which one logger wrote. Returns the
+// candidates about columns that are then explained better.
+std::vector<std::string> confirmed(const std::vector<DegreesCandidate>& candidates, const Problem& problem,
                                    const std::vector<CsvTable>& data, const IdentificationOptions& options) {
   constexpr double kGain = 0.5;  // of what is unexplained; chance and a smaller signal change it far less
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
@@ -204,22 +197,22 @@ std::vector<std::string> confirmed(const std::vector<AngleDoubt>& doubts, const 
   again.preflight = options.preflight, again.threads = options.threads, again.tests_angles = false;
   std::vector<std::string> words;
   for (const bool all : {false, true}) {
-    if (!words.empty() || (all && std::ranges::all_of(doubts, &AngleDoubt::is_likely))) break;
+    if (!words.empty() || (all && std::ranges::all_of(candidates, &DegreesCandidate::is_likely))) break;
     std::vector<CsvTable> converted = data;
-    for (const AngleDoubt& doubt : doubts)
+    for (const DegreesCandidate& c : candidates)
       for (std::size_t e = 0; e < data.size(); ++e)
-        if ((all || doubt.is_likely) && record_name(experiments[e]) == doubt.record && data[e].has_column(doubt.column))
-          for (double& x : converted[e].columns[data[e].find_column(doubt.column)]) x *= std::numbers::pi / 180;
+        if ((all || c.is_likely) && record_name(experiments[e]) == c.record && data[e].has_column(c.column))
+          for (double& x : converted[e].columns[data[e].find_column(c.column)]) x *= std::numbers::pi / 180;
     const std::vector<ChannelRecord> degrees = fit_of(problem, converted, again).records;
-    for (const AngleDoubt& doubt : doubts) {
+    for (const DegreesCandidate& c : candidates) {
       const auto record = std::ranges::find_if(
-          degrees, [&](const ChannelRecord& r) { return r.record == doubt.record && r.column == doubt.column; });
-      const double before = doubt.unexplained, after = record == degrees.end() ? 1 : record->unexplained();
-      if ((all || doubt.is_likely) && after <= kGain * before)
+          degrees, [&](const ChannelRecord& r) { return r.record == c.record && r.column == c.column; });
+      const double before = c.unexplained, after = record == degrees.end() ? 1 : record->unexplained();
+      if ((all || c.is_likely) && after <= kGain * before)
         words.push_back(fmt::format(
             "{}: {}; in degrees, a fit leaves {:.2g} of the deviation of its values, not {:.2g}: is the column in "
             "degrees? \"unit\": \"{}\" converts it, while numbers of sigma and bias stay in {}",
-            doubt.path, doubt.words, after, before, doubt.unit == "rad" ? "deg" : "deg/s", doubt.unit));
+            c.path, c.words, after, before, c.unit == "rad" ? "deg" : "deg/s", c.unit));
     }
   }
   return words;

@@ -87,7 +87,7 @@ double percentile(std::vector<double>& values, double part) {
 Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationResult& fit,
                  const RecoveryOptions& options) {
   const std::vector<ResampledChannel> records = records_of(problem, data, fit);
-  const bool in_blocks = options.bootstrap || fit.statistics.covariance_type != CovarianceType::white;
+  const bool in_blocks = fit.statistics.covariance_type != CovarianceType::white;
   std::mutex progress_lock;
   std::atomic<bool> stopped = false;
   int done = 0;
@@ -102,7 +102,7 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
           std::max<std::size_t>(1, static_cast<std::size_t>(blocks * static_cast<double>(record.rows.size())));
       simulate_noise(record, block, generator, simulated);
     }
-    Problem again = options.bootstrap ? with_fitted_values(problem, fit) : problem;
+    Problem again = problem;
     keep_fitted(again, simulated);
     IdentificationOptions identification;
     identification.user_forces = options.user_forces;

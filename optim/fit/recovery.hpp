@@ -36,9 +36,8 @@ struct Recovery {
 };
 
 struct RecoveryOptions {
-  int seeds = 0;           // 1, 2, ..., seeds
-  bool bootstrap = false;  // blocks of residuals always, and fits from the values that were found
-  int threads = 1;         // fits at a time; results do not depend on it
+  int seeds = 0;    // 1, 2, ..., seeds
+  int threads = 1;  // fits at a time; results do not depend on it
   std::vector<std::shared_ptr<const UserForce>> user_forces = {};
   // Called from any thread, one at a time: after each fit, false stops; within a simulation, false abandons all.
   std::function<bool(int done)> progress = {};

@@ -58,7 +58,7 @@ ResidualAnalysis analyse_residuals(const Eigen::VectorXd& z) {
 std::string ResidualAnalysis::in_words() const {
   if (samples < static_cast<std::size_t>(kFewest)) return "too few to say";
   if (white()) return "white";
-  if (ljung_box_p >= kDoubtful) return runs_z < 0 ? "signs in long runs" : "signs alternate";
+  if (ljung_box_p >= kSignificant) return runs_z < 0 ? "signs in long runs" : "signs alternate";
   return fmt::format("correlated in time (lag 1: {:.2f})", autocorrelation);
 }
 

@@ -25,8 +25,8 @@ struct ResidualAnalysis {
   std::size_t runs = 0;
   double runs_z = 0, runs_p = 1;  // how many standard deviations too many; two-sided
 
-  static constexpr double kDoubtful = 0.01;  // p below it
-  bool white() const { return ljung_box_p >= kDoubtful && runs_p >= kDoubtful; }
+  static constexpr double kSignificant = 0.01;  // p below it
+  bool white() const { return ljung_box_p >= kSignificant && runs_p >= kSignificant; }
   std::string in_words() const;  // "white", or what speaks against it
 };
 

@@ -64,7 +64,7 @@ MatrixXd ScoreVariance::within(const MatrixXd& scores) const { return sum_of_squ
 
 MatrixXd ScoreVariance::between(const MatrixXd& scores) const { return sum_of_squares(scores, records_, false); }
 
-double ScoreVariance::kept(const VectorXd& a_J, const MatrixXd& q, bool of_one_record) const {
+double ScoreVariance::share_left(const VectorXd& a_J, const MatrixXd& q, bool of_one_record) const {
   const double all = a_J.squaredNorm();
   double explained = 0;
   const bool within = !is_between(of_one_record);

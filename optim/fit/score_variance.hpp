@@ -19,8 +19,8 @@
 // records, so the variance is that of Newey and West. Correlations are those of Newey and West, too.
 //
 // The fit takes off the residuals what it can explain, so that B is too small. In the direction a of the parameters it
-// keeps this part of white noise, with the orthonormal basis q of the columns of J,
-//   kept = 1 - sum_p a' B(J q_p) a/sum_i (a' J_i)^2,       B(J q_p): of the scores J_i q_ip
+// leaves this share of white noise, with the orthonormal basis q of the columns of J,
+//   left = 1 - sum_p a' B(J q_p) a/sum_i (a' J_i)^2,       B(J q_p): of the scores J_i q_ip
 // by which B is divided, whatever the noise (Bell and McCaffrey, Survey Methodology 28 (2002) 169).
 //
 // A motion in several windows tells more. A wrong law has other best parameters in each window, and the fit hides this
@@ -66,7 +66,7 @@ class ScoreVariance {
   // Each record's z as a fit to the other records would leave it. inverse: (J'J)^-1, 0 of parameters held by a bound.
   Eigen::VectorXd left_out(Eigen::VectorXd z, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse) const;
   // The part of the variance that the fit leaves. a_J: a' J_i; q: columns.
-  double kept(const Eigen::VectorXd& a_J, const Eigen::MatrixXd& q, bool of_one_record) const;
+  double share_left(const Eigen::VectorXd& a_J, const Eigen::MatrixXd& q, bool of_one_record) const;
   long freedom() const;  // of the estimate of each variance
 
  private:

@@ -30,10 +30,6 @@ double quantile_975(long degrees_of_freedom, bool sigma_is_known) {
   return student_quantile(static_cast<double>(degrees_of_freedom), 0.975);
 }
 
-struct Variances {
-  double variance, likelihood_scale;
-};
-
 // psi = rho1 z and psi_z = rho1 + 2 z^2 rho2 of each residual. For the square psi is z.
 struct Influences {
   VectorXd psi, psi_z;
@@ -51,18 +47,16 @@ Influences influences_of(const FitData& data) {
   return all;
 }
 
-// The likelihood's scale is mean(psi^2)/mean(psi_z), by which twice the rise of the cost is about chi^2: Hampel,
-// Ronchetti, Rousseeuw and Stahel, "Robust Statistics" (1986), section 7.2. For the square both are s^2.
-Variances variances(const FitData& data, long degrees_of_freedom, double s2) {
-  if (data.loss.type == LossType::squared) return {data.sigma_is_known ? 1 : s2, data.sigma_is_known ? 1 : s2};
+// v, as in the header.
+double variance_of(const FitData& data, long degrees_of_freedom, double s2) {
+  if (data.loss.type == LossType::squared) return data.sigma_is_known ? 1 : s2;
   const double N = static_cast<double>(data.z.size()), P = static_cast<double>(data.rho.size() - data.C.rows());
-  if (degrees_of_freedom < 1) return {s2, s2};
+  if (degrees_of_freedom < 1) return s2;
   const Influences of = influences_of(data);
   const double slope = of.psi_z.mean(), slope_squares = of.psi_z.squaredNorm() / N;
-  if (!(slope > 0)) return {kInfinity, kInfinity};
+  if (!(slope > 0)) return kInfinity;
   const double K = 1 + P / N * (slope_squares - slope * slope) / (slope * slope);
-  const double mean_square = of.psi.squaredNorm() / static_cast<double>(degrees_of_freedom);
-  return {K * K * mean_square / (slope * slope), mean_square / slope};
+  return K * K * of.psi.squaredNorm() / static_cast<double>(degrees_of_freedom) / (slope * slope);
 }
 
 // Orthonormal columns Z with C Z = 0; C: of independent rows.
@@ -156,9 +150,9 @@ MatrixXd sandwich_covariance(const FitData& data, const ScoreVariance& scores_va
     const bool alone = is_set(data.of_one_record, a), by_windows = !alone && scores_vary.has_windows();
     VectorXd of_a = scores * inverse.col(a);
     if (by_windows) of_a += a_J.col(a).cwiseProduct(left_out - z);
-    const double kept = by_windows ? 1 : scores_vary.kept(a_J.col(a), q.topRows(N), alone);
+    const double left = by_windows ? 1 : scores_vary.share_left(a_J.col(a), q.topRows(N), alone);
     const double variance_a =
-        (scores_vary.is_between(alone) ? scores_vary.between(of_a) : scores_vary.within(of_a))(0, 0) / kept;
+        (scores_vary.is_between(alone) ? scores_vary.between(of_a) : scores_vary.within(of_a))(0, 0) / left;
     if (within(a, a) > 0) larger(a) = std::sqrt(variance_a / within(a, a));
   }
   MatrixXd covariance = larger.asDiagonal() * within * larger.asDiagonal();
@@ -189,13 +183,12 @@ FitStatistics fit_statistics(const FitData& data) {
   s.degrees_of_freedom = static_cast<long>(N + R + data.C.rows() - P);
   s.residual_variance =
       s.degrees_of_freedom > 0 ? data.z.squaredNorm() / static_cast<double>(s.degrees_of_freedom) : kNaN;
-  const Variances v = variances(data, s.degrees_of_freedom, s.residual_variance);
-  s.variance = v.variance, s.likelihood_scale = v.likelihood_scale;
+  s.variance = variance_of(data, s.degrees_of_freedom, s.residual_variance);
   // Without it, the determined combinations are still found.
   const double variance = std::isfinite(s.variance) ? s.variance : 1;
   const bool normal = data.sigma_is_known && data.loss.type == LossType::squared;
   s.quantile = quantile_975(s.degrees_of_freedom, normal);
-  s.std_error.setZero(P), s.ci95.setZero(P, 2);
+  s.std_error.setZero(P);
   s.covariance.setZero(P, P), s.correlation.setIdentity(P, P);
   if (P == 0) return s;
 
@@ -215,16 +208,12 @@ FitStatistics fit_statistics(const FitData& data) {
   std::vector<VectorXd> unseen;  // directions, in changes over sizes
   for (const Index k : columns.unseen) unseen.push_back(VectorXd::Unit(P, k));
   if (!unseen.empty()) s.condition_number = kInfinity;
-  s.singular_values.setZero(static_cast<Index>(unseen.size()));
   if (!columns.used.empty()) {
     const MatrixXd scaled = J(Eigen::all, columns.used) * columns.length(columns.used).cwiseInverse().asDiagonal();
     const Directions directions = directions_of(data, scaled, columns);
     const VectorXd& sigma = directions.sigma;
     const Index F = sigma.size(), rank = directions.rank;
     if (unseen.empty()) s.condition_number = sigma(F - 1) > 0 ? sigma(0) / sigma(F - 1) : kInfinity;
-    s.singular_values.setZero(F + static_cast<Index>(unseen.size()));
-    s.singular_values.head(F) = sigma, s.rank = static_cast<long>(rank);
-    if (rank > 1) s.weakest.setZero(P), s.weakest(columns.used) = directions.vectors.col(rank - 1);
     const MatrixXd V = directions.over_sigma(), white = variance * (V * V.transpose());
     set_covariance(s, columns,
                    sandwich ? sandwich_covariance(data, scores_vary, scaled, V, columns.used, variance) : white, white);
@@ -241,8 +230,6 @@ FitStatistics fit_statistics(const FitData& data) {
   const std::vector<bool> changed = changed_parameters(null_space);
   for (Index k = 0; k < P; ++k) {
     s.std_error(k) = changed[static_cast<std::size_t>(k)] ? kInfinity : std::sqrt(s.covariance(k, k));
-    const double half = s.std_error(k) == 0 ? 0 : s.quantile * s.std_error(k);
-    s.ci95.row(k) << data.rho(k) - half, data.rho(k) + half;
   }
   if (!std::isfinite(s.variance))
     withhold_errors(s,
@@ -267,7 +254,8 @@ std::string FitStatistics::covariance_in_words() const {
 
 void withhold_errors(FitStatistics& statistics, std::string why) {
   statistics.none = std::move(why);
-  statistics.std_error.setConstant(kNaN), statistics.ci95.setConstant(kNaN), statistics.covariance.setConstant(kNaN);
+  statistics.std_error.setConstant(kNaN);
+  statistics.covariance.setConstant(kNaN);
   statistics.correlation.resize(0, 0);
 }
 

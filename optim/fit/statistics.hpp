@@ -3,7 +3,8 @@
 //   residuals z(rho) in units of their sigma, Jacobian J = dz/drho, N rows, P columns, at the solution
 //   s^2         = z'z / (N + R - P)                        residual variance, R: number of priors
 //   covariance  = (J'J/v + J_prior'J_prior)^-1             v = s^2; 1 where sigma is known
-//   std_error_k = sqrt(covariance_kk)                      ci95 = rho_k -+ t(0.975, N + R - P) std_error_k
+//   std_error_k = sqrt(covariance_kk)                      95 % interval: rho_k -+ quantile std_error_k
+//   quantile    = t(0.975, N + R - P)                      that of the normal distribution where sigma is known
 // Seber and Wild, "Nonlinear Regression" (1989), sections 2.1 and 5.1. Priors are taken at their word.
 //
 // With a loss other than the square the estimate is Huber's M-estimate, and with psi(z) = rho'(z^2) z
@@ -23,7 +24,7 @@
 //   FitData data;
 //   data.J = J, data.z = z, data.rho = rho, data.names = {"m1", "m2"};
 //   const FitStatistics s = fit_statistics(data);
-//   s.std_error(0), s.ci95(0, 1), s.correlation(0, 1);
+//   s.std_error(0), s.quantile, s.correlation(0, 1);
 //   for (const std::string& words : s.unidentifiable) std::cout << words;   // "m1, m2: only m1 + m2 is determined"
 #pragma once
 
@@ -61,21 +62,16 @@ struct FitData {
 struct FitStatistics {
   std::string none;                     // why there are no standard errors, in words; they are NaN then
   Eigen::VectorXd std_error;            // infinite where the data do not determine the parameter
-  Eigen::MatrixXd ci95;                 // P x 2
   Eigen::MatrixXd covariance;           // of the determined combinations
   Eigen::MatrixXd correlation;          // ones on the diagonal
   double residual_variance = kUnknown;  // s^2, also where it is not used; NaN without degrees of freedom
   double variance = kUnknown;           // v
-  double likelihood_scale = kUnknown;   // of 2 (cost - least cost), in which it is about chi^2 of a parameter
   Eigen::VectorXd inflation;            // variance of each parameter over that for white residuals
   CovarianceType covariance_type = CovarianceType::white;
   double quantile = kUnknown;               // of the intervals
   long degrees_of_freedom = 0;              // N + R - P
   double condition_number = kUnknown;       // infinite where a column of J is zero
   std::vector<std::string> unidentifiable;  // in words
-  Eigen::VectorXd singular_values;          // of J, its columns of unit length; descending, 0 for a zero column
-  long rank = 0;                            // how many of them are above the tolerance: combinations determined
-  Eigen::VectorXd weakest;                  // the right singular vector of the last of these; empty below rank 2
 
   std::string covariance_in_words() const;  // what the standard errors take the residuals for
 
@@ -83,7 +79,7 @@ struct FitStatistics {
 };
 
 FitStatistics fit_statistics(const FitData& data);
-// Takes away what holds at a minimum only: standard errors, intervals, correlations.
+// Takes away what holds at a minimum only: standard errors and correlations.
 void withhold_errors(FitStatistics& statistics, std::string why);
 
 }  // namespace mbsopt::inline optim

@@ -84,7 +84,7 @@ PROBLEMS = {
 LONG = {  # commands that journal and resume
     "one design": ["design", "one_design.json", "--keep-journal"],
     "four designs": ["design", "four_designs.json", "--threads", "2", "--keep-journal"],
-    "one fit": ["identify", "one_fit.json", "--profile", "k", "--keep-journal"],
+    "one fit": ["identify", "one_fit.json", "--keep-journal"],
     "four fits": ["identify", "four_fits.json", "--threads", "2", "--keep-journal"],
 }
 SHORT = {

@@ -54,26 +54,26 @@ TEST_CASE("doubts about a fit are the same in any number of threads", "[threads]
   kick.body = "arm", kick.components = {f("0"), f("0"), f("1e-3*abs(t - tp)/(t - tp)")};
   problem.scene.forces.push_back({"kick", kick});
   const std::vector<CsvTable> data{pendulum::exact_motion(50, 0.5, 2.5, 0, 1)};
-  const std::vector<std::string> one = start_of_fit(problem, data).doubts;
+  const std::vector<std::string> one = start_of_fit(problem, data).warnings;
   CHECK_FALSE(one.empty());
   IdentificationOptions four;
   four.threads = 4;
-  CHECK(start_of_fit(problem, data, four).doubts == one);
+  CHECK(start_of_fit(problem, data, four).warnings == one);
 }
 
-TEST_CASE("a bootstrap of residuals has the scatter of the standard errors, in any number of threads",
+TEST_CASE("fits of simulated records have the scatter of the standard errors, in any number of threads",
           "[threads][recovery]") {
   const repetitions::Study study = repetitions::studies()[1];
   const std::vector<CsvTable> data = repetitions::repeated(study, 3);
   const IdentificationResult fit = run_identification(study.problem, data);
-  const Recovery one = recover(study.problem, data, fit, {.seeds = 40, .bootstrap = true}),
-                 two = recover(study.problem, data, fit, {.seeds = 40, .bootstrap = true, .threads = 2});
+  const Recovery one = recover(study.problem, data, fit, {.seeds = 40}),
+                 two = recover(study.problem, data, fit, {.seeds = 40, .threads = 2});
   REQUIRE(one.fits == 40);
   REQUIRE(two.parameters.size() == fit.parameters.size());
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
     const RecoveredParameter &p = one.parameters[k], &same = two.parameters[k];
     INFO(p.name << ": scatter " << p.scatter);
-    CHECK(p.scatter == Approx(fit.parameters[k].std_error).epsilon(0.5));  // ten blocks per record
+    CHECK(p.scatter == Approx(fit.parameters[k].std_error).epsilon(0.5));
     CHECK(p.ci95[0] < p.mean);
     CHECK(p.mean < p.ci95[1]);
     CHECK(p.scatter == same.scatter);

@@ -252,16 +252,6 @@ TEST_CASE("identify: what GNU timeout ends keeps the best values so far", "[comm
   CHECK(json_of(out / "result.json").at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-6));
 }
 
-TEST_CASE("identify --profile: an unknown name is found before the fit", "[command]") {
-  const TemporaryFolder folder;
-  folder.write("swing.csv", measured_swing(folder));
-  const std::string file = folder.write("fit.json", identification_problem());
-  const CommandOutcome outcome = run_command({"identify", file, "--out", folder.file("out"), "--profile", "zz"});
-  CHECK(outcome.exit_code == kBadInput);
-  CHECK_THAT(outcome.err, Contains("--profile: 'zz' is not fitted") && !Contains("iteration"));
-  CHECK_FALSE(std::filesystem::exists(folder.path / "out" / kJournalFile));
-}
-
 TEST_CASE("identify: the first row of the history holds the gradient of the start", "[command]") {
   const TemporaryFolder folder;
   folder.write("swing.csv", measured_swing(folder));

@@ -92,7 +92,7 @@ TEST_CASE("a fit whose unknown moves a jump says so by the jump and by a differe
     torque.body = "arm", torque.components = {Expression::parse("0"), Expression::parse("0"), Expression::parse(law)};
     problem.scene.forces.resize(1);
     problem.scene.forces.push_back({"kick", torque});
-    return joined_lines(start_of_fit(problem, data).doubts);
+    return joined_lines(start_of_fit(problem, data).warnings);
   };
   CHECK_THAT(doubts("1e-3*abs(t - tp)/(t - tp)"),
              Contains("the law of force 'kick' jumps by 0.002") && Contains("the derivative of the residuals in 'tp'"));

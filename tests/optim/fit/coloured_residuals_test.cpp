@@ -117,7 +117,7 @@ struct Decay {
 
 }  // namespace
 
-TEST_CASE("tied windows have the standard errors and the bootstrap of the whole record", "[covariance][recovery]") {
+TEST_CASE("tied windows have the standard errors and the recovery of the whole record", "[covariance][recovery]") {
 #ifdef __SANITIZE_ADDRESS__
   return;  // twenty times slower
 #endif
@@ -129,14 +129,14 @@ TEST_CASE("tied windows have the standard errors and the bootstrap of the whole 
     REQUIRE((one.ok() && free.ok() && other.ok()));
     const CutProblem cut = cut_into_windows(tied.problem, tied.data),
                      cut_free = cut_into_windows(untied.problem, untied.data);
-    const RecoveryOptions options{.seeds = 40, .bootstrap = true};
+    const RecoveryOptions options{.seeds = 40};
     const Recovery of_one = recover(whole.problem, whole.data, one, options),
                    of_other = recover(cut.problem, cut.data, other, options),
                    of_free = recover(cut_free.problem, cut_free.data, free, options);
     for (std::size_t k = 0; k < 2; ++k) {
       const double error = one.parameters[k].std_error;
       INFO(tau << " " << one.parameters[k].name << ": whole " << error << ", tied " << other.parameters[k].std_error
-               << ", untied " << free.parameters[k].std_error << "; bootstraps " << of_one.parameters[k].scatter << ", "
+               << ", untied " << free.parameters[k].std_error << "; scatters " << of_one.parameters[k].scatter << ", "
                << of_other.parameters[k].scatter << ", " << of_free.parameters[k].scatter);
       CHECK(other.parameters[k].value == Approx(one.parameters[k].value).epsilon(1e-4));
       CHECK(other.parameters[k].std_error == Approx(error).epsilon(0.02));

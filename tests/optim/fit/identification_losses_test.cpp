@@ -365,28 +365,6 @@ TEST_CASE("an exact record has no sigma to estimate, and does not divide by it",
   CHECK(result.experiments[0].channels[0].sigma > 0);
 }
 
-TEST_CASE("profiles of fitted parameters agree with the linear intervals where there is much data",
-          "[identification][profile]") {
-  IdentificationOptions options;
-  options.profiles = {"w2", "run1.theta0"};
-  const IdentificationResult result = run_identification(fit_problem(), {noisy(5)}, options);
-  REQUIRE(result.ok());
-  REQUIRE(result.profiles.size() == 2);
-  for (const std::size_t i : {0u, 1u}) {
-    const ParameterProfile& profile = result.profiles[i];
-    const FittedParameter& p = result.parameters[i == 0 ? 0 : 2];
-    CHECK(profile.name == p.name);
-    REQUIRE(profile.lower);
-    REQUIRE(profile.upper);
-    CHECK(*profile.lower == Approx(p.ci95[0]).margin(0.02 * p.std_error));
-    CHECK(*profile.upper == Approx(p.ci95[1]).margin(0.02 * p.std_error));
-    for (const auto& point : profile.points) CHECK(point.cost >= result.cost_final * (1 - 1e-9));
-  }
-  options.profiles = {"w3"};
-  CHECK_THROWS_WITH(run_identification(fit_problem(), {noisy(5)}, options),
-                    Contains("'w3' is not fitted (did you mean 'w2'?); fitted are w2, c, run1.theta0, run1.omega0"));
-}
-
 TEST_CASE("of m g a/J only the quotient is determined, and it is called that", "[identification][identifiability]") {
   Problem p = fit_problem(64, 0.055);
   testing::add_parameters(p.scene, {{"m", 0.5}, {"g", 9.81}, {"a", 0.1}, {"J0", 0.5 * 9.81 * 0.1 / 63}});

@@ -159,7 +159,7 @@ TEST_CASE("standard errors of what validates hold those of the shared parameters
   CHECK(std::sqrt(squares) / claimed == Approx(1).margin(0.4));  // 3 standard deviations of the scatter of 30
 }
 
-TEST_CASE("what validates is compared with the start, and predicted with its measurements", "[identification]") {
+TEST_CASE("what validates is predicted with its measurements", "[identification]") {
   Problem p = fit_problem(60, 0.1, 1.5, 1.5);
   p.identification->experiments.push_back(pendulum::experiment("other", {"theta0", "omega0"}));
   ExperimentSpec& other = p.identification->experiments[1];
@@ -172,11 +172,6 @@ TEST_CASE("what validates is compared with the start, and predicted with its mea
     const IdentificationResult result = run_identification(p, {fitted, second});
     REQUIRE(result.ok());
     const ExperimentFit& validation = result.experiments[1];
-    REQUIRE(validation.rms_scaled_at_start);
-    const double rms = validation.channels[0].rms_scaled;
-    CHECK((rms < *validation.rms_scaled_at_start) == same);
-    const auto info = [](const std::string& w) { return w.find("raised those that validate") != std::string::npos; };
-    CHECK(std::ranges::count_if(result.warnings, info) == (same ? 0 : 1));
     // 95 % of 401 measurements, to three standard deviations of that share.
     CHECK(result.experiments[0].channels[0].within_prediction == Approx(0.95).margin(0.033));
     if (same) CHECK(validation.channels[0].within_prediction == Approx(0.95).margin(0.033));
@@ -365,7 +360,7 @@ TEST_CASE("a fit that reached its iteration limit has no standard errors", "[ide
   CHECK_THAT(result.statistics.none, Contains("ended before"));
 }
 
-TEST_CASE("a record of angles in degrees is doubted", "[identification]") {
+TEST_CASE("a record of angles in degrees is questioned", "[identification]") {
   Problem p = fit_problem(64, 0.055, 1.53, 1.55);
   p.identification->experiments[0].free.clear();
   CsvTable data = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2);

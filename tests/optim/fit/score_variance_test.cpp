@@ -123,7 +123,7 @@ TEST_CASE("what the fit leaves of the variance is that of white noise", "[covari
     }
     const double kept = sum / static_cast<double>(noise.cols()) / a_J.squaredNorm();
     // 4000 values of a chi^2 of 7 to 15 degrees of freedom: one standard error is 0.008.
-    CHECK(variance.kept(a_J, q, false) == Approx(kept).margin(0.025));
+    CHECK(variance.share_left(a_J, q, false) == Approx(kept).margin(0.025));
     CHECK(kept < 0.9);
   }
 }
@@ -133,5 +133,6 @@ TEST_CASE("of a mean, the part of the variance that is left is 1 - b + b^2/3", "
   const VectorXd t = VectorXd::LinSpaced(n, 0, 1), ones = VectorXd::Ones(n);
   const ScoreVariance variance(CovarianceType::newey_west, {{0, t}});
   const double b = kLagPart;
-  CHECK(variance.kept(ones, ones / std::sqrt(static_cast<double>(n)), false) == Approx(1 - b + b * b / 3).margin(1e-3));
+  CHECK(variance.share_left(ones, ones / std::sqrt(static_cast<double>(n)), false) ==
+        Approx(1 - b + b * b / 3).margin(1e-3));
 }

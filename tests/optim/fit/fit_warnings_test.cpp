@@ -1,5 +1,5 @@
 // Fits name copies of columns, runs that disagree, wrong units, and samples that a loss takes out.
-#include "optim/fit/fit_doubts.hpp"
+#include "optim/fit/fit_warnings.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -65,7 +65,7 @@ std::vector<double> with_noise(std::vector<double> values, double sigma, unsigne
 }  // namespace
 
 TEST_CASE("a copy of a channel is named, also with a little noise of its own, or with its sign turned",
-          "[identification][doubts]") {
+          "[identification][fit_warnings]") {
   Record runs(1);
   CHECK(runs.warnings().empty());
   SECTION("a plain copy") { add_column(runs, "copy", runs.data[0].columns[1]); }
@@ -80,7 +80,7 @@ TEST_CASE("a copy of a channel is named, also with a little noise of its own, or
 }
 
 TEST_CASE("two sensors of one angle are no copies, even where the model errs alike in both",
-          "[identification][doubts]") {
+          "[identification][fit_warnings]") {
   Record runs(1);
   const CsvTable exact = pendulum::exact_motion(64, 0.055, 1.5, 1.55, 2);
   add_column(runs, "second", with_noise(exact.columns[1], kNoise, 7));
@@ -92,7 +92,7 @@ TEST_CASE("two sensors of one angle are no copies, even where the model errs ali
   CHECK_THAT(fmt::format("{}", fmt::join(result.warnings, "\n")), !Contains("change alike"));
 }
 
-TEST_CASE("a run that disagrees with two others is named, whatever the sigmas are", "[identification][doubts]") {
+TEST_CASE("a run that disagrees with two others is named, whatever the sigmas are", "[identification][fit_warnings]") {
   const SigmaEstimate how = GENERATE(SigmaEstimate::none, SigmaEstimate::shared, SigmaEstimate::own);
   Record runs(3);
   runs.estimate(how);
@@ -113,8 +113,8 @@ TEST_CASE("a run that disagrees with two others is named, whatever the sigmas ar
   CHECK_THAT(warnings, !Contains("experiment 'run1'") && !Contains("experiment 'run2'"));
 }
 
-TEST_CASE("an estimated sigma far above the given one is doubted, and one that no file gives is not",
-          "[identification][doubts][sigma]") {
+TEST_CASE("an estimated sigma far above the given one is questioned, and one that no file gives is not",
+          "[identification][fit_warnings][sigma]") {
   Record runs(1);
   runs.estimate(SigmaEstimate::shared);
   Field& sigma = runs.problem.identification->experiments[0].channels[0].sigma;
@@ -128,8 +128,8 @@ TEST_CASE("an estimated sigma far above the given one is doubted, and one that n
   CHECK(runs.warnings().empty());
 }
 
-TEST_CASE("a channel that an estimated sigma gives up is doubted, one that rests is not",
-          "[identification][doubts][sigma]") {
+TEST_CASE("a channel that an estimated sigma gives up is questioned, one that rests is not",
+          "[identification][fit_warnings][sigma]") {
   Record runs(1);
   runs.problem.scene.sensors.push_back(runs.problem.scene.sensors[0]);
   runs.problem.scene.sensors[1].name = "rate", runs.problem.scene.sensors[1].quantity = "rate";
@@ -148,7 +148,8 @@ TEST_CASE("a channel that an estimated sigma gives up is doubted, one that rests
   CHECK_THAT(runs.warnings(), !Contains("explains nothing"));
 }
 
-TEST_CASE("a loss that takes samples out names their rows, and the rest is judged", "[identification][doubts][loss]") {
+TEST_CASE("a loss that takes samples out names their rows, and the rest is judged",
+          "[identification][fit_warnings][loss]") {
   Record runs(1);
   runs.data[0].name = "run.csv";
   runs.problem.identification->loss = {LossType::tukey};
@@ -164,7 +165,7 @@ TEST_CASE("a loss that takes samples out names their rows, and the rest is judge
   CHECK_THAT(warnings, !Contains("explains nothing"));
 }
 
-TEST_CASE("a record is asked about degrees only if degrees explain it better", "[identification][doubts]") {
+TEST_CASE("a record is asked about degrees only if degrees explain it better", "[identification][fit_warnings]") {
   // The model starts near rest and stays there: its damping is held far too large. The record spans twenty times as
   // much, in radians.
   Record runs(1);

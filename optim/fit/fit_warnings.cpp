@@ -1,4 +1,4 @@
-#include "optim/fit/fit_doubts.hpp"
+#include "optim/fit/fit_warnings.hpp"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <numbers>
 #include <set>
 
+#include "core/linear/dense.hpp"
 #include "core/scene/scene_facts.hpp"
-#include "optim/fit/experiment_influence.hpp"
 #include "optim/fit/sigma_estimation.hpp"
 #include "optim/problem/logged_columns.hpp"
 
@@ -31,13 +31,17 @@ double rms(const Eigen::VectorXd& x) { return x.norm() / std::sqrt(std::max(1.0,
 double deviation(const Eigen::VectorXd& x) { return x.size() > 0 ? rms(x.array() - x.mean()) : 0; }
 double span_of(const Eigen::VectorXd& x) { return x.maxCoeff() - x.minCoeff(); }
 
-class Doubts {
+class FitWarnings {
  public:
-  Doubts(const FitContext& fit, const std::vector<ChannelRecord>& records, const ExperimentStack& stack)
+  FitWarnings(const FitContext& fit, const std::vector<ChannelRecord>& records, const ExperimentStack& stack)
       : fit_(fit), stack_(stack), records_(records) {}
 
   std::vector<std::string> all(const LeastSquaresResult& solution) {
-    for (const ChannelRecord& s : records_) say_taken_out(s), doubt_explanation(s), doubt_given_sigma(s);
+    for (const ChannelRecord& s : records_) {
+      name_outliers(s);
+      check_explanation(s);
+      check_given_sigma(s);
+    }
     for (const ChannelRecord& s : records_) compare_elsewhere(s);
     // A record that estimated sigmas have given up tells nothing of the others.
     if (std::ranges::all_of(reasons_, [](const auto& of) { return of.second.empty(); })) leave_out_each(solution);
@@ -48,19 +52,19 @@ class Doubts {
             record, why);
     for (auto b = records_.begin(); b != records_.end(); ++b)
       for (auto a = records_.begin(); a != b; ++a) compare_noise(*a, *b);
-    return std::move(doubts_);
+    return std::move(warnings_);
   }
 
  private:
   template <class... T>
   void add(fmt::format_string<T...> words, T&&... values) {
-    doubts_.push_back(fmt::format(words, std::forward<T>(values)...));
+    warnings_.push_back(fmt::format(words, std::forward<T>(values)...));
   }
   double time(Eigen::Index i) const { return fit_.result.residuals[static_cast<std::size_t>(i)].t; }
 
   // Huber's loss takes out none: its pull is constant. Neighbours are one part: "run.csv:57 (1.12 s), run.csv:60 to
   // run.csv:64 (1.2 to 1.28 s)".
-  void say_taken_out(const ChannelRecord& s) {
+  void name_outliers(const ChannelRecord& s) {
     constexpr int kMost = 5;  // parts in a sentence
     std::string places;
     int parts = 0;
@@ -85,7 +89,7 @@ class Doubts {
           s.taken_out.size(), s.taken_out.size() + s.rows.size(), s.column, s.record, places);
   }
 
-  void doubt_explanation(const ChannelRecord& s) {
+  void check_explanation(const ChannelRecord& s) {
     if (s.left > s.spread && s.is_beyond())
       add("the fit explains nothing of '{}' in '{}': its residuals are {:.3g} (rms), the measured values differ from "
           "their own mean by {:.3g} (rms). A unit, a sign or the model is wrong, or the fit ended in another minimum: "
@@ -93,8 +97,8 @@ class Doubts {
           s.column, s.record, s.left, s.spread);
   }
 
-  // Doubts a shared sigma once, and none that the file does not give.
-  void doubt_given_sigma(const ChannelRecord& s) {
+  // Questions a shared sigma once, and none that the file does not give.
+  void check_given_sigma(const ChannelRecord& s) {
     const Experiment& model =
         std::ranges::find(stack_.members(), s.experiment, &ExperimentStack::Member::experiment)->model;
     const ChannelSpec& channel = fit_.spec.experiments[s.experiment].channels[s.channel];
@@ -118,26 +122,45 @@ class Doubts {
                          most);
   }
 
+  // How well the linear model at the solution would explain the others without a record. With their normal equations
+  // H d = g the squares of their residuals fall by g'd. Cook and Weisberg, "Residuals and Influence in Regression"
+  // (1982), section 3.4. Own parameters at a bound stay there; a parameter that no other record determines drops out.
   void leave_out_each(const LeastSquaresResult& solution) {
+    constexpr double kDetermined = 1e-10;  // of H, its columns of unit length
     const bool shares = std::ranges::any_of(stack_.unknowns(), &UnknownParameter::shared);
     if (reasons_.size() < 2 || stack_.equalities > 0 || !shares ||
         std::ranges::none_of(records_, &ChannelRecord::is_resolved))
       return;
-    std::vector<std::size_t> group_of_member;
-    std::vector<std::string> names;  // of the groups
+    std::vector<Eigen::Index> columns;
+    for (Eigen::Index k = 0; k < stack_.variables(); ++k)
+      if (stack_.unknowns()[static_cast<std::size_t>(k)].shared || !stack_.is_at_bound(solution.x, k))
+        columns.push_back(k);
+    const Eigen::VectorXd root = stack_.weights(solution.point.z).cwiseSqrt();
+    const Eigen::VectorXd z = root.cwiseProduct(solution.point.z);
+    Eigen::MatrixXd J = root.asDiagonal() * solution.point.z_x(Eigen::all, columns);
+    for (Eigen::Index k = 0; k < J.cols(); ++k) J.col(k).normalize();
+    const Eigen::MatrixXd H = J.transpose() * J;
+    const Eigen::VectorXd g = J.transpose() * z;
+    std::vector<std::pair<std::string, Eigen::Index>> samples_of;  // record after record
     for (const ExperimentStack::Member& m : stack_.members()) {
       const std::string& name = record_name(fit_.spec.experiments[m.experiment]);
-      if (names.empty() || names.back() != name) names.push_back(name);
-      group_of_member.push_back(names.size() - 1);
+      if (samples_of.empty() || samples_of.back().first != name) samples_of.emplace_back(name, 0);
+      samples_of.back().second += std::ssize(m.model.samples());
     }
-    const std::vector<OthersWithout> others = others_without(stack_, solution, group_of_member);
-    for (std::size_t g = 0; g < names.size(); ++g) {
-      const auto& [change, samples, before, after] = others[g];
-      const double n = static_cast<double>(samples), freedom = n - static_cast<double>(stack_.variables());
-      if (freedom > 0 && after / freedom < kDisagree * kDisagree * before / n)
-        reasons_[names[g]] +=
+    Eigen::Index first = 0;
+    for (const auto& [record, n] : samples_of) {
+      const Eigen::MatrixXd J_r = J.middleRows(first, n);
+      const Eigen::VectorXd z_r = z.segment(first, n), g_others = g - J_r.transpose() * z_r;
+      first += n;
+      const Eigen::VectorXd d = OrthogonalDecomposition(H - J_r.transpose() * J_r, kDetermined).solve(g_others);
+      const double fall = g_others.dot(d);
+      const double before = z.head(stack_.samples()).squaredNorm() - z_r.squaredNorm();
+      const double after = std::max(before - fall, 0.0), others = static_cast<double>(stack_.samples() - n);
+      const double freedom = others - static_cast<double>(stack_.variables());
+      if (freedom > 0 && after / freedom < kDisagree * kDisagree * before / others)
+        reasons_[record] +=
             fmt::format("; without it the residuals of the others would fall from {:.3g} to {:.3g} sigma (rms)",
-                        std::sqrt(before / n), std::sqrt(after / freedom));
+                        std::sqrt(before / others), std::sqrt(after / freedom));
     }
   }
 
@@ -169,8 +192,8 @@ class Doubts {
   const ExperimentStack& stack_;
   const std::vector<ChannelRecord>& records_;
   std::map<std::string, std::string> reasons_;  // why a record disagrees
-  std::set<std::string> revised_;               // columns whose shared sigma is doubted
-  std::vector<std::string> doubts_;
+  std::set<std::string> revised_;               // columns whose shared sigma is questioned already
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace
@@ -207,14 +230,14 @@ std::vector<ChannelRecord> channel_records(const FitContext& fit, const Experime
   return all;
 }
 
-std::vector<std::string> doubts_of_fit(const FitContext& fit, const std::vector<ChannelRecord>& records,
-                                       const ExperimentStack& stack, const LeastSquaresResult& solution) {
-  return Doubts(fit, records, stack).all(solution);
+std::vector<std::string> warnings_of_fit(const FitContext& fit, const std::vector<ChannelRecord>& records,
+                                         const ExperimentStack& stack, const LeastSquaresResult& solution) {
+  return FitWarnings(fit, records, stack).all(solution);
 }
 
-std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const std::vector<ChannelRecord>& records,
-                                     const ExperimentStack& stack, const Eigen::VectorXd& z_start) {
-  std::vector<AngleDoubt> doubts;
+std::vector<DegreesCandidate> degrees_candidates(const FitContext& fit, const std::vector<ChannelRecord>& records,
+                                                 const ExperimentStack& stack, const Eigen::VectorXd& z_start) {
+  std::vector<DegreesCandidate> candidates;
   for (const ChannelRecord& s : records) {
     const auto sensor = std::ranges::find(fit.scene.sensors, s.sensor, &Sensor::name);
     const std::string unit = unit_of(fit.scene, *sensor);
@@ -225,15 +248,15 @@ std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const std::vector<Ch
                  start = span_of(s.measured - z_start(s.rows).cwiseProduct(stack.sigma()(s.rows)));
     const auto as_degrees = [&](double model) { return span > kNear * model && span < kNear * kDegrees * model; };
     const bool plausible = s.is_explained() || (unit == "rad" && span <= std::numbers::pi);
-    doubts.push_back(
+    candidates.push_back(
         {s.record, s.column, fmt::format("{}.channels[{}].column", place_of(fit.spec, s.experiment), s.channel), unit,
          fmt::format("the values of '{}' span {:.3g}, those of the model {:.3g} {} at the start of the fit "
                      "and {:.3g} {} at its end",
                      s.column, span, start, unit, end, unit),
          !plausible && (as_degrees(start) || as_degrees(end)), s.unexplained()});
   }
-  if (std::ranges::none_of(doubts, &AngleDoubt::is_likely)) doubts.clear();
-  return doubts;
+  if (std::ranges::none_of(candidates, &DegreesCandidate::is_likely)) candidates.clear();
+  return candidates;
 }
 
 }  // namespace mbsopt::inline optim

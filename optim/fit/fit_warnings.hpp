@@ -1,9 +1,9 @@
-// Doubts about a fit, in sentences. They judge the samples that the loss keeps, record by record: the windows of an
+// Warnings of a fit, in sentences. They judge the samples that the loss keeps, record by record: the windows of an
 // experiment are one record.
 //
 //   const std::vector<ChannelRecord> records = channel_records(fit, stack);
-//   for (std::string& words : doubts_of_fit(fit, records, stack, solution)) ...
-//   for (const AngleDoubt& doubt : angle_doubts(fit, records, stack, z_start)) ...   // to be tested by another fit
+//   for (std::string& words : warnings_of_fit(fit, records, stack, solution)) ...
+//   for (const DegreesCandidate& c : degrees_candidates(fit, records, stack, z_start)) ...   // tested by another fit
 #pragma once
 
 #include <Eigen/Core>
@@ -33,20 +33,20 @@ std::vector<ChannelRecord> channel_records(const FitContext& fit, const Experime
 
 // Names samples that a loss takes out, channels of which the fit explains nothing, records that disagree with the
 // others, estimated sigmas far above the given ones, and channels that repeat another one.
-std::vector<std::string> doubts_of_fit(const FitContext& fit, const std::vector<ChannelRecord>& records,
-                                       const ExperimentStack& stack, const LeastSquaresResult& solution);
+std::vector<std::string> warnings_of_fit(const FitContext& fit, const std::vector<ChannelRecord>& records,
+                                         const ExperimentStack& stack, const LeastSquaresResult& solution);
 
 // The column of a record that may be in degrees, since no unit is stated. It is likely if its measured values span
 // about 180/pi times as much as the model at the start or at the end of the fit, angles more than half a turn, and if
 // the fit does not explain it.
-struct AngleDoubt {
+struct DegreesCandidate {
   std::string record, column, path, unit, words;
   bool is_likely = false;
   double unexplained = 1;
 };
 
 // None if none is likely. z_start: residuals by the sigmas of the stack.
-std::vector<AngleDoubt> angle_doubts(const FitContext& fit, const std::vector<ChannelRecord>& records,
-                                     const ExperimentStack& stack, const Eigen::VectorXd& z_start);
+std::vector<DegreesCandidate> degrees_candidates(const FitContext& fit, const std::vector<ChannelRecord>& records,
+                                                 const ExperimentStack& stack, const Eigen::VectorXd& z_start);
 
 }  // namespace mbsopt::inline optim
