@@ -54,7 +54,8 @@ std::function<bool(double t)> fit_progress(Run& run) {
 
 IdentificationOptions simulating(Run& run) {
   IdentificationOptions options;
-  options.threads = case_threads(run), options.simulation_progress = fit_progress(run);
+  options.threads = case_threads(run);
+  options.simulation_progress = fit_progress(run);
   return options;
 }
 
@@ -123,11 +124,13 @@ void add_recovery(Run& run, const CutProblem& cut, const IdentificationResult& f
 // there.
 IdentificationResult at_start(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
   IdentificationOptions options;
-  options.threads = case_threads(run), options.simulation_progress = [](double) { return !interrupted(); };
+  options.threads = case_threads(run);
+  options.simulation_progress = [](double) { return !interrupted(); };
   FitStart start = start_of_fit(needed, data, options);
   run.warn(start.warnings);
   if (!run.context.options.preflight) return std::move(start.residuals);
-  options = simulating(run), options.preflight = true;
+  options = simulating(run);
+  options.preflight = true;
   start.residuals = run_identification(needed, data, options);
   run.progress.finish();
   return std::move(start.residuals);
@@ -272,7 +275,8 @@ int identify_command(const CommandContext& context) {
   const char* const kept = run.problem.identification->multistart && interrupted() ? "best of the starts" : "best fit";
   long_run.begin();
   IdentificationResult fit = fitted(long_run, best.problem, whole, cut.problem);
-  fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
+  fit.simulations += best.simulations;
+  fit.wall_seconds += best.wall_seconds;
   if (fit.history.empty())  // it was stopped before its first evaluation
     fit.cost_initial = fit.cost_final = std::numeric_limits<double>::quiet_NaN();
   set_units(fit, cut.problem, data);

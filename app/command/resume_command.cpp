@@ -46,7 +46,8 @@ int resume_command(const CommandContext& context) {
   if (!ends.empty() && last.status != "interrupted" && ends.back() == last.status) return nothing_left(context, last);
   const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
   CommandOptions options = options_of(arguments);  // those of the run, except for the current folder
-  options.threads = context.options.threads, options.quiet = context.options.quiet;
+  options.threads = context.options.threads;
+  options.quiet = context.options.quiet;
   const auto from_here = [&](const char* key) {
     return (folder / journal.header.at(key).get<std::string>()).lexically_normal().string();
   };
@@ -56,7 +57,9 @@ int resume_command(const CommandContext& context) {
   options.out = folder.string();
   options.resume = true;
   CommandContext again = context;
-  again.command = journal.header.value("command", ""), again.arguments = arguments, again.options = options;
+  again.command = journal.header.value("command", "");
+  again.arguments = arguments;
+  again.options = options;
   if (CommandFunction* const command = resumable(again.command)) return command(again);
   throw std::invalid_argument(
       fmt::format("{}: belongs to '{}', which cannot be resumed", (folder / kJournalFile).string(), again.command));

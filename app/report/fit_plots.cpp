@@ -102,12 +102,16 @@ LinePlot autocorrelation(const FitPlot& fit) {
   }
   mean /= static_cast<double>(samples);
   std::vector<double> e = fit.residual;  // about the mean, 0 in a gap
-  for (double& z : e) z = std::isfinite(z) ? z - mean : 0, power += z * z;
+  for (double& z : e) {
+    z = std::isfinite(z) ? z - mean : 0;
+    power += z * z;
+  }
   PlotSeries r{"autocorrelation", {}, {}, Mark::bars, {}, data_colour(fit)};
   for (std::size_t lag = 1; lag <= std::min(kMostLags, std::ranges::max(lengths) / 4); ++lag) {
     double sum = 0;
     for (std::size_t i = 0; i + lag < e.size(); ++i) sum += part[i] == part[i + lag] ? e[i] * e[i + lag] : 0;
-    r.x.push_back(static_cast<double>(lag)), r.y.push_back(power > 0 ? sum / power : 0);
+    r.x.push_back(static_cast<double>(lag));
+    r.y.push_back(power > 0 ? sum / power : 0);
   }
   const double limit = 1.96 / std::sqrt(static_cast<double>(samples));
   return {.title = fmt::format("{}: autocorrelation of the residuals of {}", fit.experiment, fit.channel),

@@ -56,7 +56,8 @@ void add_outcome(RunPage& page, const IdentificationResult& fit) {
 
 TableRow row_of(const FittedParameter& p) {
   TableCell value = number_cell(p.value, 9), error = number_cell(p.std_error, 3), interval = "-";
-  value.brief = rounded(p.value, p.std_error), error.brief = significant(p.std_error, 2);
+  value.brief = rounded(p.value, p.std_error);
+  error.brief = significant(p.std_error, 2);
   if (!std::isfinite(p.std_error)) error = "-";
   if (std::isinf(p.std_error)) interval = "undetermined";
   if (std::isfinite(p.std_error)) {
@@ -159,7 +160,9 @@ void show_correlation(RunPage& page, const IdentificationResult& fit) {
       TableCell& cell = row.emplace_back(std::isfinite(entry) ? fmt::format("{:.3f}", entry) : "-");
       if (k < i && std::abs(entry) >= kStrong) strong.add({fit.parameters[k].name, row.front(), cell.text});
       if (!std::isfinite(entry)) continue;
-      cell.brief = fmt::format("{:.2f}", entry), cell.full = fmt::format("{:.4f}", entry), cell.shade = entry;
+      cell.brief = fmt::format("{:.2f}", entry);
+      cell.full = fmt::format("{:.4f}", entry);
+      cell.shade = entry;
       if (dense) cell.text = cell.brief = "";
     }
     if (i < shown) matrix.add(std::move(row));

@@ -183,14 +183,20 @@ void add_plots(RunPage& page, const Tradeoff& tradeoff) {
     for (const std::string_view group : {kExplicit, kImplicit, kFormulation, kGradient}) {
       const LinePlot plot = work_precision(tradeoff, units, q, group);
       if (plot.series.empty()) continue;
-      if (!std::exchange(any, true)) page.heading("Error over time"), page.begin_choices({"error of", "with"});
+      if (!std::exchange(any, true)) {
+        page.heading("Error over time");
+        page.begin_choices({"error of", "with"});
+      }
       page.begin_choice({tradeoff.quantities()[q].name, std::string(group)});
       page.paragraph(sentence_of(page.run.result, tradeoff, q));
       page.plot(plot);
       page.end_choice();
     }
   }
-  if (any) page.end_choices(), page.note(kHowToRead);
+  if (any) {
+    page.end_choices();
+    page.note(kHowToRead);
+  }
 }
 
 void add_rows(RunPage& page, const Tradeoff& tradeoff) {

@@ -93,7 +93,8 @@ void Experiment::replace_laws(const ExperimentSpec& spec, const std::string& pla
     if (drive == scene_.drives.end())
       throw std::invalid_argument(
           fmt::format("{}.drives[{}].drive: there is no drive '{}'", place, i, spec.drives[i].drive));
-    drive->law = spec.drives[i].law, drive->samples = spec.drives[i].samples;
+    drive->law = spec.drives[i].law;
+    drive->samples = spec.drives[i].samples;
   }
 }
 
@@ -273,7 +274,8 @@ class Experiment::Reading {
   Reading(const Experiment& experiment, const Eigen::VectorXd& u, const Limits& limits)
       : of_(experiment), limits_(limits), settings_(experiment.settings_), rho_(experiment.rho_), unknowns_(u.size()) {
     for (const Unknown& unknown : of_.unknowns_) rho_(unknown.parameter) = u(unknown.at);
-    r_.z.setZero(static_cast<Eigen::Index>(of_.samples_.size())), r_.z_u.setZero(r_.z.size(), u.size());
+    r_.z.setZero(static_cast<Eigen::Index>(of_.samples_.size()));
+    r_.z_u.setZero(r_.z.size(), u.size());
     for (const Channel& c : of_.channels_) now_.push_back(at_time(c, settings_.start_time));
     if (limits.max_steps) settings_.integrator.max_steps = std::min(settings_.integrator.max_steps, *limits.max_steps);
   }
@@ -334,7 +336,8 @@ class Experiment::Reading {
     const std::vector<bool> none(of_.active_.size(), false);
     const Mechanism mechanism(of_.scene_, rho_, limits_.derivatives ? of_.active_ : none, of_.user_forces_,
                               of_.programs_);
-    y_bar_.resize(mechanism.states()), rho_bar_.resize(rho_.size());
+    y_bar_.resize(mechanism.states());
+    rho_bar_.resize(rho_.size());
     TangentSampling sampling;
     Sampling values;
     (limits_.derivatives ? sampling.times : values.times) = times_;
@@ -350,10 +353,12 @@ class Experiment::Reading {
       });
     };
     RunOptions options;
-    options.progress = limits_.progress, options.exact_stages = true;
+    options.progress = limits_.progress;
+    options.exact_stages = true;
     const SimulationResult result = limits_.derivatives ? simulate_tlm(mechanism, settings_, {}, sampling, options)
                                                         : simulate(mechanism, settings_, {}, values, options);
-    r_.steps = result.statistics.steps, r_.jumps = result.statistics.jumps;
+    r_.steps = result.statistics.steps;
+    r_.jumps = result.statistics.jumps;
     r_.ok = result.ok() && seen_ == of_.samples_.size();
     r_.message = result.message;
   }
@@ -376,7 +381,8 @@ class Experiment::Reading {
     const Sample& sample = of_.samples_[i];
     const Channel& channel = of_.channels_[sample.channel];
     const ChannelNow& c = of_sample(sample);
-    y_bar_.setZero(), rho_bar_.setZero();
+    y_bar_.setZero();
+    rho_bar_.setZero();
     const double s = mechanism.add_sensor_gradient(channel.sensor, at, 1, y_bar_, rho_bar_);
     const bool held = of_.times_[sample.time] - c.delay.value < settings_.start_time;
     const double sdot = of_.delayed_ && !held && !of_.unknowns_.empty() ? y_bar_.dot(*at.ydot) : 0.0;

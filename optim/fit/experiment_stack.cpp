@@ -47,7 +47,8 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, std::vector<Unknow
       scaling_(scaling_of(unknowns_)),
       go_on_(std::move(go_on)),
       threads_(threads) {
-  x_lower = scaling_.x_lower(), x_upper = scaling_.x_upper();
+  x_lower = scaling_.x_lower();
+  x_upper = scaling_.x_upper();
   loss = fit_loss;
   for (std::size_t i = 0; i < unknowns_.size(); ++i)
     if (const auto& prior = unknowns_[i].description.prior)
@@ -100,7 +101,8 @@ void ExperimentStack::tie() {
     for (Index k = 0; k < chart.size(); ++k) parts[i].rows.push_back(row++);
     for (const Experiment::Unknown& unknown : own) sizes.push_back(size_of(unknown));
   }
-  equalities = row - size, size = row;
+  equalities = row - size;
+  size = row;
   if (sizes.empty()) return;
   const IntegratorSettings integrator = members_.front().model.simulated().simulation.integrator;
   closed = (integrator.step ? kRounding : integrator.rtol) *

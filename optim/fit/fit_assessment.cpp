@@ -43,9 +43,10 @@ void set_interval(FittedParameter& f, double half, bool logarithmic) {
 
 void name_experiments(FitContext& fit) {
   fit.result.experiments.resize(fit.spec.experiments.size());
-  for (std::size_t e = 0; e < fit.spec.experiments.size(); ++e)
-    fit.result.experiments[e].name = fit.spec.experiments[e].name,
+  for (std::size_t e = 0; e < fit.spec.experiments.size(); ++e) {
+    fit.result.experiments[e].name = fit.spec.experiments[e].name;
     fit.result.experiments[e].validate = fit.spec.experiments[e].validate;
+  }
 }
 
 void score_experiment(FitContext& fit, const ExperimentStack::Member& member, const Eigen::VectorXd& z,
@@ -54,7 +55,8 @@ void score_experiment(FitContext& fit, const ExperimentStack::Member& member, co
   const Experiment& model = member.model;
   ExperimentFit& scored = fit.result.experiments[member.experiment];
   scored.window = spec.origin;
-  scored.start_time = model.start_time(), scored.end_time = model.end_time();
+  scored.start_time = model.start_time();
+  scored.end_time = model.end_time();
   scored.samples = model.samples().size();
   std::vector<std::vector<double>> by_channel(spec.channels.size());
   for (std::size_t i = 0; i < scored.samples; ++i) {
@@ -69,8 +71,10 @@ void score_experiment(FitContext& fit, const ExperimentStack::Member& member, co
   for (std::size_t c = 0; c < spec.channels.size(); ++c) {
     const Eigen::Map<const Eigen::VectorXd> z_c(by_channel[c].data(), static_cast<Eigen::Index>(by_channel[c].size()));
     ChannelFit& channel = scored.channels.emplace_back();
-    channel.column = spec.channels[c].column, channel.sensor = spec.channels[c].sensor;
-    channel.samples = by_channel[c].size(), channel.missing = model.missing(c);
+    channel.column = spec.channels[c].column;
+    channel.sensor = spec.channels[c].sensor;
+    channel.samples = by_channel[c].size();
+    channel.missing = model.missing(c);
     channel.sigma = model.sigma(c);
     channel.sigma_is_estimated = estimated && spec.channels[c].estimate_sigma != SigmaEstimate::none;
     channel.rms_scaled = z_c.norm() / std::sqrt(std::max(1.0, static_cast<double>(z_c.size())));
@@ -94,23 +98,31 @@ void score_all(FitContext& fit, const ExperimentStack& stack, const Eigen::Vecto
 FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& solution, const ExperimentStack& stack) {
   const Eigen::MatrixXd J = stack.z_rho(solution.point, solution.x);
   FitData data;
-  data.J = J.topRows(stack.samples()), data.J_prior = J.middleRows(stack.samples(), stack.plain);
+  data.J = J.topRows(stack.samples());
+  data.J_prior = J.middleRows(stack.samples(), stack.plain);
   data.C = J.bottomRows(stack.equalities);
   data.z = solution.point.z.head(stack.samples());
   data.rho = stack.scaling().to_rho(solution.x);
   data.names = names_of(stack.unknowns(), fit.spec);
-  data.loss = fit.spec.loss, data.sigma_is_known = fit.spec.sigma_is_known;
+  data.loss = fit.spec.loss;
+  data.sigma_is_known = fit.spec.sigma_is_known;
   data.change = stack.scaling().rho_x(solution.x).cwiseAbs();
   data.covariance = covariance_for(fit, stack);
   for (const UnknownParameter& u : stack.unknowns()) {
     data.at_bound.push_back(stack.is_at_bound(solution.x, std::ssize(data.at_bound)));
-    data.units.push_back(u.description.unit), data.of_one_record.push_back(!u.shared);
+    data.units.push_back(u.description.unit);
+    data.of_one_record.push_back(!u.shared);
   }
-  data.records = stack.records_in_time(), data.motions = stack.motions_in_time();
+  data.records = stack.records_in_time();
+  data.motions = stack.motions_in_time();
   data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
   const IntegratorSettings& integrator = fit.scene.simulation.integrator;
   if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);
-  if (fit.options.preflight) data.loss = {}, data.sigma_is_known = true, data.covariance = CovarianceType::white;
+  if (fit.options.preflight) {
+    data.loss = {};
+    data.sigma_is_known = true;
+    data.covariance = CovarianceType::white;
+  }
   FitStatistics statistics = fit_statistics(data);
   const bool ended = fit.options.preflight || solution.status == SolverStatus::converged ||
                      solution.status == SolverStatus::no_progress;
@@ -127,13 +139,20 @@ std::vector<FittedParameter> described(const FitContext& fit, const ExperimentSt
     const Parameter& p = u.description;
     const Eigen::Index k = std::ssize(fitted);
     FittedParameter f;
-    f.name = name_of(u, fit.spec), f.parameter = p.name, f.unit = p.unit;
+    f.name = name_of(u, fit.spec);
+    f.parameter = p.name;
+    f.unit = p.unit;
     if (!u.shared) f.experiment = fit.spec.experiments[u.experiment].name;
-    f.initial = p.value, f.value = values(k), f.lower = p.lower, f.upper = p.upper, f.prior = p.prior;
+    f.initial = p.value;
+    f.value = values(k);
+    f.lower = p.lower;
+    f.upper = p.upper;
+    f.prior = p.prior;
     auto touches = [&](const std::optional<double>& bound) {
       return bound && std::abs(f.value - *bound) <= kTouches * std::max(std::abs(*bound), std::abs(p.value));
     };
-    f.at_lower = touches(p.lower), f.at_upper = touches(p.upper);
+    f.at_lower = touches(p.lower);
+    f.at_upper = touches(p.upper);
     if (statistics.std_error.size() > k) {
       f.std_error = statistics.std_error(k);
       const double half = f.std_error == 0 ? 0 : statistics.quantile * f.std_error;
@@ -169,7 +188,8 @@ void compare_by_likelihood(FitContext& fit, const ExperimentStack& stack, const 
   if (fit.spec.loss.type != LossType::squared || !(v > 0)) return;
   const double k = static_cast<double>(stack.freedom_of_variables()) + (scaled ? 1 : static_cast<double>(sigmas));
   const double twice = squares / v + N * std::log(2 * std::numbers::pi * v) + 2 * stack.sigma().array().log().sum();
-  fit.result.aic = 2 * k + twice, fit.result.bic = k * std::log(N) + twice;
+  fit.result.aic = 2 * k + twice;
+  fit.result.bic = k * std::log(N) + twice;
 }
 
 }  // namespace mbsopt::inline optim

@@ -30,12 +30,15 @@ class LinearStack : public LeastSquaresProblem {
  public:
   LinearStack(const ExperimentStack& stack, const LeastSquaresResult& about)
       : LeastSquaresProblem(stack.variables(), stack.size), stack_(stack), about_(about), sigma_(stack.sigma()) {
-    x_lower = stack.x_lower, x_upper = stack.x_upper;
-    plain = stack.plain, parts = stack.parts;
+    x_lower = stack.x_lower;
+    x_upper = stack.x_upper;
+    plain = stack.plain;
+    parts = stack.parts;
   }
 
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override {
-    point.z = about_.point.z + about_.point.z_x * (x - about_.x), point.z_x = about_.point.z_x;
+    point.z = about_.point.z + about_.point.z_x * (x - about_.x);
+    point.z_x = about_.point.z_x;
     const Eigen::ArrayXd factor = sigma_.cwiseQuotient(stack_.sigma()).array();
     point.z.head(factor.size()).array() *= factor;
     point.z_x.topRows(factor.size()).array().colwise() *= factor;
@@ -66,7 +69,8 @@ LeastSquaresResult FitSearch::minimised(const Eigen::VectorXd& x, double loosest
   };
   LeastSquaresResult solution = solve_with_equalities(stack_, x, solver);
   fit_.result.iterations += solution.iterations;
-  fit_.result.evaluations += solution.evaluations, fit_.result.failed_evaluations += solution.failed_evaluations;
+  fit_.result.evaluations += solution.evaluations;
+  fit_.result.failed_evaluations += solution.failed_evaluations;
   return solution;
 }
 
@@ -96,8 +100,10 @@ LeastSquaresResult FitSearch::best_without_sigmas(SigmaEstimation& sigmas, const
   sigmas.set(first);
   LeastSquaresResult released = without_sigmas(sigmas, known ? *known : minimised(x, kGuess).x);
   if (fit_.sigmas_are_estimated && sigmas.likelihood(released.point.z) < likelihood) return released;
-  fit_.result.history.resize(rows), apart_.resize(rows);
-  sigmas.set(found), fit_.sigmas_are_estimated = true;
+  fit_.result.history.resize(rows);
+  apart_.resize(rows);
+  sigmas.set(found);
+  fit_.sigmas_are_estimated = true;
   return free;
 }
 

@@ -62,7 +62,8 @@ FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data,
 
   DifferenceComparison comparison;
   const LeastSquaresPoint at = stack.collected(found, x);
-  comparison.f = at.z.head(stack.samples()), comparison.f_rho = stack.z_rho(at, x).topRows(stack.samples());
+  comparison.f = at.z.head(stack.samples());
+  comparison.f_rho = stack.z_rho(at, x).topRows(stack.samples());
   for (const UnknownParameter& unknown : stack.unknowns())
     comparison.variables.push_back(compared_variable(name_of(unknown, spec), unknown.description));
   comparison.groups = {{"the residuals", 0, comparison.f.size()}};

@@ -176,10 +176,16 @@ class FitWarnings {
       const double t_a = time(a.rows[static_cast<std::size_t>(i)]), t_b = time(b.rows[static_cast<std::size_t>(k)]);
       if (t_a == t_b) {
         const double da = a.residual(i) - last_a, db = b.residual(k) - last_b;
-        if (pairs++ > 0) aa += da * da, bb += db * db, ab += da * db;
-        last_a = a.residual(i), last_b = b.residual(k);
+        if (pairs++ > 0) {
+          aa += da * da;
+          bb += db * db;
+          ab += da * db;
+        }
+        last_a = a.residual(i);
+        last_b = b.residual(k);
       }
-      i += t_a <= t_b, k += t_b <= t_a;
+      i += t_a <= t_b;
+      k += t_b <= t_a;
     }
     if (pairs >= kFewest && ab * ab > kCopied * kCopied * aa * bb)
       add("the residuals of '{}' and '{}' in '{}' change alike from sample to sample (correlation {:.3f}): one column "
@@ -217,12 +223,15 @@ std::vector<ChannelRecord> channel_records(const FitContext& fit, const Experime
   }
   std::erase_if(all, [](const ChannelRecord& r) { return r.rows.empty() && r.taken_out.empty(); });
   for (ChannelRecord& r : all) {
-    r.measured.resize(static_cast<Eigen::Index>(r.rows.size())), r.residual.resize(r.measured.size());
+    r.measured.resize(static_cast<Eigen::Index>(r.rows.size()));
+    r.residual.resize(r.measured.size());
     for (Eigen::Index i = 0; i < r.measured.size(); ++i) {
       const ResidualRow& row = fit.result.residuals[static_cast<std::size_t>(r.rows[static_cast<std::size_t>(i)])];
-      r.measured(i) = row.measured, r.residual(i) = row.measured - row.model;
+      r.measured(i) = row.measured;
+      r.residual(i) = row.measured - row.model;
     }
-    r.left = rms(r.residual), r.spread = deviation(r.measured);
+    r.left = rms(r.residual);
+    r.spread = deviation(r.measured);
     const bool estimated = fit.spec.experiments[r.experiment].channels[r.channel].estimate_sigma != SigmaEstimate::none;
     r.noise =
         estimated ? differenced_noise(r.measured) : fit.result.experiments[r.experiment].channels[r.channel].sigma;

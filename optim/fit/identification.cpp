@@ -193,8 +193,11 @@ std::vector<std::string> confirmed(const std::vector<DegreesCandidate>& candidat
   constexpr double kGain = 0.5;  // of what is unexplained; chance and a smaller signal change it far less
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   IdentificationOptions again;
-  again.user_forces = options.user_forces, again.simulation_progress = options.simulation_progress;
-  again.preflight = options.preflight, again.threads = options.threads, again.tests_angles = false;
+  again.user_forces = options.user_forces;
+  again.simulation_progress = options.simulation_progress;
+  again.preflight = options.preflight;
+  again.threads = options.threads;
+  again.tests_angles = false;
   std::vector<std::string> words;
   for (const bool all : {false, true}) {
     if (!words.empty() || (all && std::ranges::all_of(candidates, &DegreesCandidate::is_likely))) break;

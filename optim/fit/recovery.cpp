@@ -31,12 +31,16 @@ std::vector<ResampledChannel> records_of(const Problem& problem, const std::vect
     records.push_back({data[e].find_column(experiments[e].channels[c].column), {}, {}, {}});
   std::size_t row = 0, experiment = 0;
   for (const ResidualRow& sample : fit.residuals) {  // by experiment, then time
-    if (sample.experiment != experiment) experiment = sample.experiment, row = 0;
+    if (sample.experiment != experiment) {
+      experiment = sample.experiment;
+      row = 0;
+    }
     const std::vector<double>& t = data[experiment].column(experiments[experiment].time);
     while (row + 1 < t.size() && t[row] < sample.t) ++row;
     ResampledChannel& record = records[channels.first[experiment] + sample.channel];
     record.rows.emplace_back(experiment, row);
-    record.model.push_back(sample.model), record.noise.push_back(sample.measured - sample.model);
+    record.model.push_back(sample.model);
+    record.noise.push_back(sample.measured - sample.model);
   }
   // Residuals of a fit are smaller than the noise, by the parameters that took part of it: sqrt(N/(N - P)), where
   // equations that tie windows count for less of P.

@@ -52,7 +52,8 @@ SigmaEstimation::SigmaEstimation(ExperimentStack& stack, const IdentificationSpe
     for (const Experiment::Sample& sample : member.model.samples()) {
       if (channels[sample.channel].estimate_sigma != SigmaEstimate::none) {
         Group& group = groups_[group_of[sample.channel]];
-        group.rows.push_back(row), group.largest = std::max(group.largest, std::abs(sample.measured));
+        group.rows.push_back(row);
+        group.largest = std::max(group.largest, std::abs(sample.measured));
       }
       ++row;
     }
@@ -115,7 +116,10 @@ double SigmaEstimation::take(const Eigen::VectorXd& z) {
     const double before = sigma(group);
     std::vector<double> sizes;
     double squares = 0;
-    for (const Eigen::Index row : group.rows) sizes.push_back(std::abs(z(row))), squares += z(row) * z(row);
+    for (const Eigen::Index row : group.rows) {
+      sizes.push_back(std::abs(z(row)));
+      squares += z(row) * z(row);
+    }
     const double n = static_cast<double>(sizes.size());
     const double scale = stack_.loss.type == LossType::squared ? std::sqrt(squares / (n * freedom()))
                                                                : kNormalMedian * median(std::move(sizes));

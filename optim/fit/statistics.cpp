@@ -42,7 +42,8 @@ Influences influences_of(const FitData& data) {
   for (Index i = 0; i < data.z.size(); ++i) {
     const double z = data.z(i);
     const LossValue v = data.loss.at(z * z);
-    all.psi(i) = v.rho1 * z, all.psi_z(i) = v.rho1 + 2 * z * z * v.rho2;
+    all.psi(i) = v.rho1 * z;
+    all.psi_z(i) = v.rho1 + 2 * z * z * v.rho2;
   }
   return all;
 }
@@ -95,7 +96,8 @@ Columns columns_of(const FitData& data, const MatrixXd& J, const VectorXd& size)
     if (seen > 0 && seen > kNoInfluence * data.record) {
       columns.used.push_back(k);
     } else if (tied) {  // the equations may determine it by what others show
-      columns.used.push_back(k), columns.length(k) = most_seen / std::abs(change(k));
+      columns.used.push_back(k);
+      columns.length(k) = most_seen / std::abs(change(k));
     } else {
       columns.unseen.push_back(k);
     }
@@ -189,7 +191,8 @@ FitStatistics fit_statistics(const FitData& data) {
   const bool normal = data.sigma_is_known && data.loss.type == LossType::squared;
   s.quantile = quantile_975(s.degrees_of_freedom, normal);
   s.std_error.setZero(P);
-  s.covariance.setZero(P, P), s.correlation.setIdentity(P, P);
+  s.covariance.setZero(P, P);
+  s.correlation.setIdentity(P, P);
   if (P == 0) return s;
 
   MatrixXd J(N + R, P);  // v (J'J)^-1 is the covariance

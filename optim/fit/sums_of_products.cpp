@@ -102,7 +102,8 @@ class Search {
     double length = 0, degrees = 0;
     std::vector<std::string> texts;
     for (std::size_t i = 0; i < terms.size(); ++i) {
-      left += factors[i] * terms[i]->left, gradient += factors[i] * terms[i]->gradient;
+      left += factors[i] * terms[i]->left;
+      gradient += factors[i] * terms[i]->gradient;
       length = std::max(length, std::abs(factors[i]) * terms[i]->gradient.norm());
       degrees += terms[i]->degree;
       texts.push_back(terms[i]->text);
@@ -120,7 +121,8 @@ class Search {
     double x = -rest.dot(last.left) / last.left.squaredNorm();
     const bool is_sign = std::abs(std::abs(x) - 1) <= kNothing, with_numbers = rho_.size() - Q_.cols() >= 2;
     if (is_sign ? !of_one_unit(*terms.front(), last) : !with_numbers || x == 0) return;
-    terms.push_back(&last), factors.push_back(is_sign ? std::copysign(1, x) : x);
+    terms.push_back(&last);
+    factors.push_back(is_sign ? std::copysign(1, x) : x);
     consider(terms, factors, !is_sign);
   }
 

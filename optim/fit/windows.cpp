@@ -121,7 +121,8 @@ class Cut {
     for (std::size_t k = 0; k < static_cast<std::size_t>(windows); ++k) {
       const bool last = static_cast<double>(k + 1) == windows;
       const double from = start + static_cast<double>(k) * length;
-      window.start_time = from, window.end_time = last ? end : start + static_cast<double>(k + 1) * length;
+      window.start_time = from;
+      window.end_time = last ? end : start + static_cast<double>(k + 1) * length;
       window.name = fmt::format("{}.{}", whole_.name, k + 1);
       window.origin = {whole_.name, k + 1, whole_.windows->continuity && !last};
       CsvTable rows = rows_between(data_, t_, from, *window.end_time, last);
@@ -134,7 +135,8 @@ class Cut {
  private:
   ExperimentSpec without_windows() const {
     ExperimentSpec spec = whole_;
-    spec.windows.reset(), spec.place = place_;
+    spec.windows.reset();
+    spec.place = place_;
     return spec;
   }
 
@@ -221,7 +223,8 @@ class Cut {
     std::set<double> times;
     for (const auto& [channel, t] : first) times.insert({t, t + kApart * length});
     CsvTable table;
-    table.name = data_.name, table.header = {whole_.time};
+    table.name = data_.name;
+    table.header = {whole_.time};
     table.columns.emplace_back(times.begin(), times.end());
     table.lines.resize(times.size());
     for (std::size_t c = 0; c < whole_.channels.size(); ++c) {

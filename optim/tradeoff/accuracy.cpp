@@ -171,9 +171,11 @@ class Chooser {
       judge(point, *right);
       const double error = std::max(point.largest(), AccuracyChoice::kRounding), aim = result_.wanted / 3;
       if (high_order_is_cheaper(point, *right, error, aim)) {
-        method_ = verifier_, result_.why = "a high order takes fewer right-hand sides to this accuracy";
+        method_ = verifier_;
+        result_.why = "a high order takes fewer right-hand sides to this accuracy";
         rtol = point.rtol() * std::max(aim / error, 1e-4);
-        best.reset(), last.reset();
+        best.reset();
+        last.reset();
         continue;
       }
       if (!best || is_better(point, *best)) best = point;
@@ -193,7 +195,10 @@ class Chooser {
   std::optional<Answer> renew(std::optional<Answer>& right, double& right_rtol, double rtol) {
     if (right && right_rtol <= 1.01 * rtol / kTighter) return {};
     Answer verified = verifying(rtol, right_rtol);
-    if (verified.ok) right = std::move(verified), right_rtol = result_.verified_by.rtol;
+    if (verified.ok) {
+      right = std::move(verified);
+      right_rtol = result_.verified_by.rtol;
+    }
     return right ? std::nullopt : std::optional(std::move(verified));
   }
 

@@ -35,7 +35,8 @@ std::optional<std::size_t> row_with(const Tradeoff& tradeoff, std::size_t row, Q
     SimulationSettings s = other.setting.simulation;
     if (same(s)) return i;
     const bool is_looser = s.integrator.rtol > setting.simulation.integrator.rtol;
-    s.integrator.rtol = setting.simulation.integrator.rtol, s.integrator.atol = setting.simulation.integrator.atol;
+    s.integrator.rtol = setting.simulation.integrator.rtol;
+    s.integrator.atol = setting.simulation.integrator.atol;
     if (other.within_floor && is_looser && same(s)) looser = i;
   }
   return looser;

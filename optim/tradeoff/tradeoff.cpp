@@ -85,7 +85,9 @@ class Sweep {
   TradeoffRow& add_row(const TradeoffSetting& setting, const Answer& answer, RowStatus status,
                        const std::string& message) {
     TradeoffRow& row = result_.rows.emplace_back();
-    row.setting = setting, row.status = status, row.message = message;
+    row.setting = setting;
+    row.status = status;
+    row.message = message;
     row.errors = result_.reference.errors->of(answer);
     row.deviations = result_.reference.errors->deviations(answer);
     return row;
@@ -104,13 +106,17 @@ class Sweep {
                                : abandoned ? RowStatus::abandoned
                                            : RowStatus::failed,
                                stopped ? "interrupted" : answer.message);
-    row.statistics = statistics, row.wall_seconds = wall_seconds;
+    row.statistics = statistics;
+    row.wall_seconds = wall_seconds;
     row.within_floor = answer.ok;
     Index q = 0;
     for (const Quantity& quantity : result_.quantities())
       if (row.errors(q++) > quantity.certificate) row.within_floor = false;
     if (answer.ok) row.runs = {row.wall_seconds};
-    if (answer.ok && row.errors.array().isInf().any()) row.status = RowStatus::failed, row.message = "not finite";
+    if (answer.ok && row.errors.array().isInf().any()) {
+      row.status = RowStatus::failed;
+      row.message = "not finite";
+    }
     return answer;
   }
 
@@ -182,7 +188,10 @@ class Sweep {
         settings.integrator.step = (own().end_time - own().start_time) / count;
       }
     }
-    if (own().events.empty()) add("cvodes_adams"), add("cvodes_bdf");
+    if (own().events.empty()) {
+      add("cvodes_adams");
+      add("cvodes_bdf");
+    }
     return curves;
   }
 

@@ -81,7 +81,8 @@ class Search {
       if (found[pair.second].change < found[pair.first].change) std::swap(pair.first, pair.second);
       Candidate &a = found[pair.first], &b = found[pair.second];
       if (runs_.has_gradients() && options_.gradients) add_gradients(a, b, reference);
-      reference.first = a.method, reference.second = b.method;
+      reference.first = a.method;
+      reference.second = b.method;
       reference.errors.emplace(runs_, std::move(a.answer), b.answer);
     }
     reference.wall_seconds = stopwatch.seconds();
@@ -175,7 +176,10 @@ class Search {
         const double here = apart(found[i].answer, found[j].answer);
         const bool differ = found[i].method.integrator != found[j].method.integrator && here < kAgreeing;
         const int rank = -2 * differ - (found[i].has_settled() && found[j].has_settled());
-        if (std::pair(rank, here) < std::pair(best, pair.apart)) best = rank, pair = {i, j, here};
+        if (std::pair(rank, here) < std::pair(best, pair.apart)) {
+          best = rank;
+          pair = {i, j, here};
+        }
       }
     }
     return pair;
@@ -190,7 +194,8 @@ class Search {
       shorten_steps(a.settings, b.settings, best);
       if (step_evenly(best)) reference.gradients_by += " on even steps of gauss6 and radau5";
     }
-    a.answer.psi_rho = std::move(best.answer.psi_rho), b.answer.psi_rho = std::move(best.certificate.psi_rho);
+    a.answer.psi_rho = std::move(best.answer.psi_rho);
+    b.answer.psi_rho = std::move(best.certificate.psi_rho);
   }
 
   Answer gradients_at(const SimulationSettings& settings) const {
@@ -221,7 +226,11 @@ class Search {
       for (const Answer& b : of_b) {
         if (!a.ok || !b.ok) continue;
         const double here = apart(a, b, true);
-        if (!answer || here < least) answer = &a, closest = &b, least = here;
+        if (!answer || here < least) {
+          answer = &a;
+          closest = &b;
+          least = here;
+        }
       }
     }
     if (!answer) return {};
@@ -229,7 +238,10 @@ class Search {
       for (const Answer& other : *answers) {
         if (!other.ok || &other == answer || &other == closest) continue;
         const double here = apart(*answer, other, true);
-        if (here < next_least) next = &other, next_least = here;
+        if (here < next_least) {
+          next = &other;
+          next_least = here;
+        }
       }
     }
     return {*answer, next && next_least >= least ? *next : *closest, least};
@@ -252,7 +264,10 @@ class Search {
       if (!shorten(of_a, a) || !shorten(of_b, b)) return;
       const double here = apart(a, b, true);
       ++in_vain;
-      if (here < best.apart) best = {a, b, here}, in_vain = 0;
+      if (here < best.apart) {
+        best = {a, b, here};
+        in_vain = 0;
+      }
     }
   }
 
@@ -293,14 +308,16 @@ SimulationSettings with_tolerance(SimulationSettings settings, const std::string
   IntegratorSettings& s = settings.integrator;
   const double atol = rtol * (s.step || s.rtol <= 0 ? 1e-2 : s.atol / s.rtol);
   s.atol = std::stod(fmt::format("{:.6e}", atol));  // 1e-07, not 1.0000000000000001e-07
-  s.type = integrator, s.rtol = rtol;
+  s.type = integrator;
+  s.rtol = rtol;
   s.step.reset();
   s.options = {};  // these belong to the file's own setting only
   return settings;
 }
 
 SimulationSettings with_defaults(SimulationSettings settings) {
-  settings.formulation = {}, settings.integrator = default_integrator(settings.start_time, settings.end_time);
+  settings.formulation = {};
+  settings.integrator = default_integrator(settings.start_time, settings.end_time);
   return settings;
 }
 

@@ -26,7 +26,8 @@ Answer run_within(const RunLimit& limit, const Body& body) {
       return !out_of_time && !(limit.interrupted && limit.interrupted());
     });
   } catch (const std::exception& error) {
-    answer.ok = false, answer.message = error.what();
+    answer.ok = false;
+    answer.message = error.what();
     return answer;
   }
   answer.wall_seconds = stopwatch.seconds();
@@ -100,7 +101,8 @@ Answer TradeoffRuns::gradients(const SimulationSettings& settings, GradientMetho
     const Evaluation e = evaluator.gradients(evaluator.start());
     answer.ok = e.ok;
     answer.message = e.message;
-    answer.psi = e.psi, answer.psi_rho = e.psi_rho;
+    answer.psi = e.psi;
+    answer.psi_rho = e.psi_rho;
     answer.statistics = e.statistics;
     answer.steps = e.steps;
   });
