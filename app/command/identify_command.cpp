@@ -30,7 +30,6 @@
 #include "optim/fit/fit_start.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
-#include "optim/fit/unknown_parameters.hpp"
 #include "optim/fit/windows.hpp"
 #include "optim/problem/unused_parameters.hpp"
 

@@ -8,12 +8,14 @@
 #include <nlohmann/json.hpp>
 #include <unordered_set>
 
+#include "app/json/source_text.hpp"
+
 namespace mbsopt::inline app {
 
 namespace {
 
 constexpr int kDeepestNesting = 100;
-constexpr std::string_view kBlanks = " \t\r\n", kByteOrderMark = "\xEF\xBB\xBF";
+constexpr std::string_view kBlanks = " \t\r\n";
 
 struct JsonFault {
   std::size_t at;

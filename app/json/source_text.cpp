@@ -10,7 +10,6 @@ namespace mbsopt::inline app {
 
 namespace {
 
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::size_t kLargestFile = std::size_t{256} << 20;  // no problem file is larger
 
 constexpr std::size_t kStride = 1024;  // a line may be the whole file: columns are counted from the nearest multiple

@@ -8,6 +8,8 @@
 
 namespace mbsopt::inline app {
 
+inline constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 struct Position {
   int line = 1, column = 1;  // columns in characters (code points)
 };

@@ -19,9 +19,9 @@ constexpr double kParallel = 1e-12;  // sine of the angle up to which a directio
 // The position of a body-fixed vector relative to the plane, at every value of the parameters.
 enum class Lies { in_plane, along_normal, across };
 
-class Search {
+class PlanarCompilation {
  public:
-  Search(const Scene& scene, const MechanismData& data, int normal) : scene_(scene), data_(data) {
+  PlanarCompilation(const Scene& scene, const MechanismData& data, int normal) : scene_(scene), data_(data) {
     model_.n = normal;
     model_.t1 = (normal + 1) % 3;
     model_.t2 = (normal + 2) % 3;
@@ -262,7 +262,7 @@ PlanarSearch find_planar_model(const Scene& scene, const MechanismData& data) {
   std::string reason;
   int most = -1;
   for (const int normal : {2, 0, 1}) {
-    Search search(scene, data, normal);
+    PlanarCompilation search(scene, data, normal);
     std::string why = search.run();
     if (why.empty()) return {std::make_shared<const PlanarModel>(search.take()), ""};
     const int axes = search.axes_along_normal();

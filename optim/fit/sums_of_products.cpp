@@ -31,10 +31,10 @@ struct Sum {
   VectorXd gradient;
 };
 
-class Search {
+class ProductSearch {
  public:
-  Search(const MatrixXd& Q, const VectorXd& rho, const VectorXd& size, const std::vector<std::string>& names,
-         const std::vector<std::string>& units)
+  ProductSearch(const MatrixXd& Q, const VectorXd& rho, const VectorXd& size, const std::vector<std::string>& names,
+                const std::vector<std::string>& units)
       : Q_(Q), rho_(rho), size_(size), names_(names) {
     for (const std::string& unit : units)
       if (const std::optional<Unit> known = unit.empty() ? std::nullopt : parse_unit(unit))
@@ -166,7 +166,7 @@ std::string sum_in_words(const std::vector<double>& factors, const std::vector<s
 std::optional<std::vector<std::string>> sums_of_products(const MatrixXd& Q, const VectorXd& rho, const VectorXd& size,
                                                          const std::vector<std::string>& names,
                                                          const std::vector<std::string>& units) {
-  return Search(Q, rho, size, names, units).run();
+  return ProductSearch(Q, rho, size, names, units).run();
 }
 
 }  // namespace mbsopt::inline optim

@@ -95,9 +95,9 @@ SparseMatrix scaled_and_damped(const SparseMatrix& R, const VectorXd& D, double 
   return A;
 }
 
-class Search {
+class LevenbergMarquardt {
  public:
-  Search(LeastSquaresProblem& problem, const LeastSquaresOptions& options)
+  LevenbergMarquardt(LeastSquaresProblem& problem, const LeastSquaresOptions& options)
       : problem_(problem),
         options_(options),
         own_(problem.variables()),
@@ -419,7 +419,7 @@ class Search {
 
 LeastSquaresResult solve_least_squares(LeastSquaresProblem& problem, const VectorXd& x_start,
                                        const LeastSquaresOptions& options) {
-  return Search(problem, options).run(x_start);
+  return LevenbergMarquardt(problem, options).run(x_start);
 }
 
 }  // namespace mbsopt::inline optim

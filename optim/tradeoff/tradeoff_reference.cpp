@@ -59,9 +59,9 @@ Refinement halved_steps(const char* integrator, double span, double most_evaluat
   return series;
 }
 
-class Search {
+class ReferenceSearch {
  public:
-  Search(const TradeoffRuns& runs, const ReferenceOptions& options) : runs_(runs), options_(options) {}
+  ReferenceSearch(const TradeoffRuns& runs, const ReferenceOptions& options) : runs_(runs), options_(options) {}
 
   TradeoffReference run() {
     const Stopwatch stopwatch(options_.clock);
@@ -301,7 +301,7 @@ std::string in_words(const ReferenceMethod& method) {
 }
 
 TradeoffReference converged_reference(const TradeoffRuns& runs, const ReferenceOptions& options) {
-  return Search(runs, options).run();
+  return ReferenceSearch(runs, options).run();
 }
 
 SimulationSettings with_tolerance(SimulationSettings settings, const std::string& integrator, double rtol) {

@@ -25,7 +25,7 @@ Drive angle_drive(const std::string& joint, const std::string& law) {
 
 // Slider-crank in x-y: crank about the origin, rod, slider along x with mass 2 kg; bars without mass and gravity, so
 // that the torque follows from the slider alone.
-Scene slider_crank() {
+Scene slider_of_crank() {
   Scene s;
   s.gravity = {0.0, 0.0, 0.0};
   s.bodies.push_back(plain_body("crank", 1e-9, {1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
@@ -53,7 +53,7 @@ std::vector<double> times(double end, int n) {
 }  // namespace
 
 TEST_CASE("a driven slider-crank follows its closed form over two turns, torque included", "[kinematics]") {
-  Scene scene = slider_crank();
+  Scene scene = slider_of_crank();
   scene.drives.push_back(angle_drive("A", "5*t"));
   Sensor effort;
   effort.name = "torque", effort.quantity = "drive_force", effort.drive = "motor";
@@ -86,7 +86,7 @@ TEST_CASE("a driven slider-crank follows its closed form over two turns, torque 
 }
 
 TEST_CASE("a condition holds the degree of freedom that no drive holds", "[kinematics]") {
-  Scene scene = slider_crank();
+  Scene scene = slider_of_crank();
   scene.sensors.push_back(angle_sensor("theta", "A"));
   scene.conditions.push_back({"theta", f("0.3"), f("2")});
   std::vector<SceneIssue> issues;
@@ -105,7 +105,7 @@ TEST_CASE("a condition holds the degree of freedom that no drive holds", "[kinem
 }
 
 TEST_CASE("what is not driven is said", "[kinematics]") {
-  const Scene scene = slider_crank();
+  const Scene scene = slider_of_crank();
   const Mechanism mechanism(scene, VectorXd());
   const SimulationResult result =
       solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2), [](std::size_t, const StatePoint&) {});
@@ -114,7 +114,7 @@ TEST_CASE("what is not driven is said", "[kinematics]") {
 }
 
 TEST_CASE("a drive too fast for the steps that are allowed fails at once, in words", "[kinematics]") {
-  Scene scene = slider_crank();
+  Scene scene = slider_of_crank();
   scene.drives.push_back(angle_drive("A", "1e19*t"));
   const Mechanism mechanism(scene, VectorXd());
   const SimulationResult result =
@@ -125,7 +125,7 @@ TEST_CASE("a drive too fast for the steps that are allowed fails at once, in wor
 }
 
 TEST_CASE("kinematics stops between two times that are wanted, too", "[kinematics]") {
-  Scene scene = slider_crank();
+  Scene scene = slider_of_crank();
   scene.drives.push_back(angle_drive("A", "100*t"));
   const Mechanism mechanism(scene, VectorXd());
   const SimulationResult result = solve_kinematics(
@@ -136,7 +136,7 @@ TEST_CASE("kinematics stops between two times that are wanted, too", "[kinematic
 }
 
 TEST_CASE("a drive that cannot pass a dead point fails with the time and the joints", "[kinematics]") {
-  Scene scene = slider_crank();
+  Scene scene = slider_of_crank();
   Drive push;
   push.name = "piston", push.type = "displacement", push.joint = "guide",
   push.law = f("0.8 + 0.2*t");  // 0.9: stretched
@@ -227,7 +227,7 @@ TEST_CASE("a slider that moves away from a dead point stays on its branch", "[ki
 }
 
 TEST_CASE("kinematics refuses a drive whose rate jumps in the words of a simulation", "[kinematics]") {
-  Scene scene = slider_crank();
+  Scene scene = slider_of_crank();
   scene.drives.push_back(angle_drive("A", "0.3 + 2*abs(t - 0.237)"));
   scene.simulation.end_time = 0.5;
   const Mechanism mechanism(scene, VectorXd());
@@ -250,7 +250,7 @@ TEST_CASE("kinematics of a body that no joint holds is refused", "[kinematics]")
 }
 
 TEST_CASE("conditions with an acceleration hold a degree of freedom, and so do Euler parameters", "[kinematics]") {
-  Scene scene = slider_crank();
+  Scene scene = slider_of_crank();
   scene.sensors.push_back(angle_sensor("theta", "A"));
   scene.conditions = {{"theta", f("0.4"), f("3"), f("-2")}};  // 0.4 + 3 t - t^2
   std::vector<SceneIssue> issues;
