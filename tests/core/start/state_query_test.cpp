@@ -28,7 +28,7 @@ struct Cushion final : UserForce {
 };
 
 // An arm on a ball, a link hinged to it, a rod of constant distance from the link to the ground, and a spring.
-Scene linkage() {
+Scene queried_linkage() {
   Scene s;
   add_parameters(s, {{"k", 30}, {"L", 0.5}, {"m", 1.4}});
   s.bodies = {body("arm", vec("L/2", "0.01", "0"), vec("0", "0", "0"), turned("0.3")),
@@ -51,7 +51,7 @@ Scene linkage() {
 }
 
 struct Fixture {
-  Scene scene = linkage();
+  Scene scene = queried_linkage();
   VectorXd rho = nominal(scene);
   Mechanism mechanism = at(rho);
   Assembly assembly{mechanism, 0};
