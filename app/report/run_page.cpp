@@ -19,24 +19,6 @@ namespace {
 constexpr std::size_t kMostCurves = 16;  // in one plot: each colour twice
 constexpr const char* kBetween = "place between the bounds, on the scale of the parameter [-]";
 
-// The place of a value between the bounds of a parameter, from 0 to 1, by its logarithm if that is its scale.
-struct Between {
-  double lower = 0, upper = 1;
-  bool logarithmic = false;
-
-  double operator()(double value) const {
-    return logarithmic ? std::log(value / lower) / std::log(upper / lower) : (value - lower) / (upper - lower);
-  }
-};
-
-// None without two bounds. `name` may be "run1.k"; p is an entry of result["parameters"].
-std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p) {
-  const double lower = number_of(p, "lower"), upper = number_of(p, "upper");
-  if (!(upper > lower) || !std::isfinite(upper - lower)) return std::nullopt;
-  const auto parameter = std::ranges::find(scene.parameters, name.substr(name.rfind('.') + 1), &Parameter::name);
-  return Between{lower, upper, parameter != scene.parameters.end() && parameter->scale != ParameterScale::linear};
-}
-
 // Writes rows "name, value" for the listed entries of an object.
 struct Entry {
   const char* key;
@@ -68,6 +50,17 @@ void add_provenance(HtmlPage& page, const Json& result) {
 }
 
 }  // namespace
+
+double Between::operator()(double value) const {
+  return logarithmic ? std::log(value / lower) / std::log(upper / lower) : (value - lower) / (upper - lower);
+}
+
+std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p) {
+  const double lower = number_of(p, "lower"), upper = number_of(p, "upper");
+  if (!(upper > lower) || !std::isfinite(upper - lower)) return std::nullopt;
+  const auto parameter = std::ranges::find(scene.parameters, name.substr(name.rfind('.') + 1), &Parameter::name);
+  return Between{lower, upper, parameter != scene.parameters.end() && parameter->scale != ParameterScale::linear};
+}
 
 std::vector<std::string> objective_values(const Json& objectives) {
   std::vector<std::string> values;

@@ -64,4 +64,14 @@ std::string starts_in_words(const Json& multistart);
 // "optimum" if the optimiser converged, else "best point": the end of its search. status: as in result.json.
 const char* end_of_search(std::string_view status);
 
+// The place of a value between the bounds of a parameter, from 0 to 1, by its logarithm if that is its scale.
+struct Between {
+  double lower = 0, upper = 1;
+  bool logarithmic = false;
+
+  double operator()(double value) const;
+};
+// None without two bounds. `name` may be "run1.k"; p is an entry of result["parameters"].
+std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p);
+
 }  // namespace mbsopt::inline app
