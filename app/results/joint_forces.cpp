@@ -24,8 +24,8 @@ Scene with_force_sensors(Scene scene) {
   for (const Joint* joint : joints_with_bodies(scene)) {
     for (const char* axis : {"x", "y", "z"}) {
       Sensor& sensor = sensors.emplace_back();
-      sensor.name = "force of " + joint->name + " in " +
-                    axis;  // with spaces: no sensor of a file has this name sensor.quantity = "reaction";
+      sensor.name = "force of " + joint->name + " in " + axis;  // with spaces: no sensor of a file has this name
+      sensor.quantity = "reaction";
       sensor.kind = "force";
       sensor.joint = joint->name;
       sensor.component = axis;

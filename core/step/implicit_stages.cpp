@@ -219,8 +219,7 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal go
   const bool exact = goal != Goal::tolerance;
   for (int i = 0; i < g.size(); ++i) {
     if (goal == Goal::polish) {
-      x_.col(i) << step.K.col(g.first + i).tail(layout_.positions());
-      step.lambda.col(g.first + i);
+      x_.col(i) << step.K.col(g.first + i).tail(layout_.positions()), step.lambda.col(g.first + i);
     } else {
       predict(step, g.first + i, x_.col(i));
     }
