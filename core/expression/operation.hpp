@@ -236,10 +236,8 @@ Partials<T> partials(Operation operation, const T& a, const T& b, const T& value
       return {cosh(a), zero};
     case Operation::cosh:
       return {sinh(a), zero};
-    case Operation::tanh: {
-      const T c = cosh(a);
-      return {one / c / c, zero};
-    }
+    case Operation::tanh:  // 1/cosh^2, whose own derivative would be inf/inf far out
+      return {(one - value) * (one + value), zero};
     case Operation::exp:
       return {value, zero};
     case Operation::log:

@@ -88,7 +88,8 @@ std::string QuadratureWatch::end_step(const Step& step) {
       continue;
     }
     Integral& integral = integrals_[o];
-    if (costs_[o].is_extreme || !(error > kPoor * integral.of_size) || integral.searches++ > kMostSearches) continue;
+    if (costs_[o].is_extreme || !(error > kPoor * weights_ * integral.of_size) || integral.searches++ > kMostSearches)
+      continue;
     const double t = pole(step, *costs_[o].running);
     if (std::isnan(t)) continue;
     return fmt::format(
