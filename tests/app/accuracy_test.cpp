@@ -205,8 +205,8 @@ TEST_CASE("what was chosen is said, stored and in the report", "[accuracy]") {
   const CommandOutcome outcome = run_command({"simulate", folder.write("rod.json", kPendulum), "--out",
                                               folder.file("out"), "--set", "simulation.accuracy=engineering"});
   REQUIRE(outcome.exit_code == kDone);
-  CHECK_THAT(outcome.out, Contains("accuracy: engineering (1e-05)") && Contains("Estimated error: about") &&
-                              Contains("in track"));
+  CHECK_THAT(outcome.out,
+             Contains("accuracy: engineering (1e-05)") && Contains("Estimated error: about") && Contains("in track"));
   const auto result = json_of(folder.path / "out/result.json");
   const auto& accuracy = result.at("accuracy");
   CHECK(accuracy.at("wanted") == 1e-5);
