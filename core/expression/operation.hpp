@@ -273,7 +273,7 @@ struct Tangent : Arithmetic<Tangent> {
     const Partials<double> f = partials(operation, a.x, b.x, value);
     return {value, calculus::product(a.dx, f.a) + calculus::product(b.dx, f.b)};
   }
-  friend Tangent constant(double x, const Tangent&) { return {x, 0}; }
+  friend Tangent constant(double number, const Tangent&) { return {number, 0}; }
   friend Tangent product(const Tangent& a, const Tangent& b) {
     using calculus::product;
     return {product(a.x, b.x), product(a.dx, b.x) + product(a.x, b.dx)};
