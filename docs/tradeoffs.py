@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Keeps the measured figures of `mbsopt tradeoff` in data/tradeoffs/ and writes them into docs/tradeoffs.md.
 
-    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep}/NAME to data/tradeoffs/; what is not there stays
+    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep}/NAME to data/tradeoffs/; others stay
     docs/tradeoffs.py rises OUT     of one output folder: whether curves are monotone, where an error rises along one, and why
     docs/tradeoffs.py write         from data/tradeoffs/ to docs/tradeoffs.md (between its two markers) and docs/tradeoffs/*.svg
 

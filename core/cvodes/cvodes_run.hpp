@@ -28,7 +28,7 @@ inline constexpr int kOk = 0, kTryASmallerStep = 1;
 // The size by which tolerances of a derivative are divided.
 inline double parameter_size(double rho) { return rho == 0 ? 1 : std::abs(rho); }
 
-// What follows a forward run. It may carry derivatives.
+// A follower takes the steps and samples of a forward run, and may carry derivatives along them.
 struct Follower {
   virtual ~Follower() = default;
   virtual bool differentiates() const { return true; }
