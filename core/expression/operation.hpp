@@ -186,7 +186,8 @@ inline double sign(double a) { return apply(Operation::sign, a, 0); }
 inline double not_above(double a, double b) { return apply(Operation::not_above, a, b); }
 inline double constant(double x, double) { return x; }  // x as a number of the type of the second argument
 inline double product(double a, double b) { return a == 0 || b == 0 ? 0 : a * b; }  // zero wins over an infinite factor
-inline double quotient(double a, double b) { return b == 0 ? 0 : a / b; }           // 0 where the denominator is
+inline double seeded(double seed, double factor) { return seed == 0 ? 0 : seed * factor; }  // but inf * 0 is NaN
+inline double quotient(double a, double b) { return b == 0 ? 0 : a / b; }  // 0 where the denominator is
 
 }  // namespace calculus
 
@@ -271,7 +272,7 @@ struct Tangent : Arithmetic<Tangent> {
   static Tangent of(Operation operation, const Tangent& a, const Tangent& b) {
     const double value = apply(operation, a.x, b.x);
     const Partials<double> f = partials(operation, a.x, b.x, value);
-    return {value, calculus::product(a.dx, f.a) + calculus::product(b.dx, f.b)};
+    return {value, calculus::seeded(a.dx, f.a) + calculus::seeded(b.dx, f.b)};
   }
   friend Tangent constant(double number, const Tangent&) { return {number, 0}; }
   friend Tangent product(const Tangent& a, const Tangent& b) {

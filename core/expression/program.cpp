@@ -67,7 +67,7 @@ Partials<double> Program::partials_of(const Instruction& in, double a, double b,
 Partials<Tangent> Program::partials_of(const Instruction& in, Tangent a, Tangent b, Tangent value) const {
   if (in.operation != Operation::curve) return partials(in.operation, a, b, value);
   const auto& [curve, order] = curve_of(in);
-  return {Tangent(curve->at(a.x, order + 1), calculus::product(a.dx, curve->at(a.x, order + 2))), Tangent()};
+  return {Tangent(curve->at(a.x, order + 1), calculus::seeded(a.dx, curve->at(a.x, order + 2))), Tangent()};
 }
 
 void Program::sweep_values(std::span<const double> x, double* value) const {
@@ -125,7 +125,7 @@ double Program::add_gradient_tangent(std::span<const double> x, std::span<const 
   if (code_.empty()) return 0;
   assert(scratch.value.size() >= code_.size() && gradient.size() == x.size());
   assert(x_tangent.size() == x.size() && gradient_tangent.size() == x.size());
-  using calculus::product;
+  using calculus::seeded;
   const std::size_t size = code_.size();
   double* const value = scratch.value.data();
   double* const adjoint = scratch.adjoint.data();
@@ -140,7 +140,7 @@ double Program::add_gradient_tangent(std::span<const double> x, std::span<const 
       tangent[i] = x_tangent[static_cast<std::size_t>(in.a)];
     } else {
       const Partials<double> d = partials_of(in, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
-      tangent[i] = product(tangent[in.a], d.a) + (in.b < 0 ? 0 : product(tangent[in.b], d.b));
+      tangent[i] = seeded(tangent[in.a], d.a) + (in.b < 0 ? 0 : seeded(tangent[in.b], d.b));
     }
   }
   std::fill(adjoint, adjoint + size, 0.0);
@@ -157,11 +157,11 @@ double Program::add_gradient_tangent(std::span<const double> x, std::span<const 
     }
     const auto operand = [&](int k) { return k < 0 ? Tangent() : Tangent(value[k], tangent[k]); };
     const Partials<Tangent> d = partials_of(in, operand(in.a), operand(in.b), Tangent(value[i], tangent[i]));
-    adjoint[in.a] += product(seed, d.a.x);
-    adjoint_tangent[in.a] += product(seed_tangent, d.a.x) + product(seed, d.a.dx);
+    adjoint[in.a] += seeded(seed, d.a.x);
+    adjoint_tangent[in.a] += seeded(seed_tangent, d.a.x) + seeded(seed, d.a.dx);
     if (in.b < 0) continue;
-    adjoint[in.b] += product(seed, d.b.x);
-    adjoint_tangent[in.b] += product(seed_tangent, d.b.x) + product(seed, d.b.dx);
+    adjoint[in.b] += seeded(seed, d.b.x);
+    adjoint_tangent[in.b] += seeded(seed_tangent, d.b.x) + seeded(seed, d.b.dx);
   }
   return tangent[size - 1];
 }
