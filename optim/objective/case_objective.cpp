@@ -10,11 +10,14 @@ using Eigen::VectorXd;
 CaseObjective::CaseObjective(const std::vector<CaseSpec>& cases, const DesignSpec& design)
     : w_(VectorXd::Ones(cases.empty() ? 1 : static_cast<Eigen::Index>(cases.size()))) {
   for (std::size_t c = 0; c < cases.size(); ++c) w_(static_cast<Eigen::Index>(c)) = cases[c].weight;
-  if (cases.size() > 1 && design.over == "max") k_ = design.sharpness.value_or(1);
+  if (cases.size() > 1 && design.over == "max") k_ = design.sharpness.value_or(INFINITY);
 }
 
 // exp(k (x_c - largest)), divided by their sum
 VectorXd CaseObjective::shares(const VectorXd& x) const {
+  Eigen::Index top = 0;
+  x.maxCoeff(&top);
+  if (is_true_maximum()) return VectorXd::Unit(x.size(), top);
   const VectorXd e = (k_ * (x.array() - x.maxCoeff())).exp();
   return e / e.sum();
 }
@@ -23,6 +26,7 @@ double CaseObjective::value(const VectorXd& psi) const {
   const VectorXd x = w_.cwiseProduct(psi);
   if (!is_maximum()) return x.sum();
   const double largest = x.maxCoeff();
+  if (is_true_maximum()) return largest;
   return largest + std::log((k_ * (x.array() - largest)).exp().sum()) / k_;
 }
 
@@ -32,7 +36,7 @@ VectorXd CaseObjective::gradient(const VectorXd& psi) const {
 }
 
 MatrixXd CaseObjective::hessian(const VectorXd& psi) const {
-  if (!is_maximum()) return MatrixXd::Zero(w_.size(), w_.size());
+  if (!is_maximum() || is_true_maximum()) return MatrixXd::Zero(w_.size(), w_.size());
   const VectorXd p = shares(w_.cwiseProduct(psi));
   const MatrixXd H = k_ * (MatrixXd(p.asDiagonal()) - p * p.transpose());
   return w_.asDiagonal() * H * w_.asDiagonal();

@@ -51,6 +51,16 @@ struct GradientCost {
 };
 GradientCost gradient_cost(std::size_t variables, std::size_t objectives);
 
+// One of the functions of which an objective is the largest or least: a peak of its expression, or of a peak to peak
+// value two of them.
+struct ExtremePiece {
+  Eigen::Index row = 0;  // of psi
+  int side = 1;          // -1: of the least
+  double value = 0;
+  Eigen::VectorXd gradient;  // per variable; the instant does not move it, as it is stationary
+  double t = 0;              // [s]; of two, a sum that tells pairs apart
+};
+
 // In load cases: psi and its derivatives case by case, each with all objectives. ok holds if all cases are ok.
 // Statistics are those of the first.
 struct Evaluation {
@@ -59,11 +69,13 @@ struct Evaluation {
   Eigen::VectorXd rho;                                // all parameters
   Eigen::VectorXd psi;                                // per objective
   Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 if only values were requested
+  std::vector<ExtremePiece> pieces;                   // with true_extremes and gradients; the most extreme ones first
   GradientMethod method = GradientMethod::automatic;  // the one used; automatic where no simulation was needed
   std::string choice;                                 // why, in words, where there is something to say
   std::vector<std::string> warnings;                  // sentences on doubts about these numbers
   SimulationStatistics statistics;
   StepSequence steps;
+  Eigen::VectorXd y_initial;
   long simulations = 0;  // number for this evaluation
   double wall_seconds = 0;
   std::vector<Evaluation> of_cases;  // empty where the problem has no load cases
@@ -78,6 +90,7 @@ struct EvaluatorOptions {
   std::function<bool(double t)> progress = {};  // after accepted steps; false abandons the evaluation
   bool exact_stages = true;                     // of values(), as in RunOptions: those of gradients() always are
   int threads = 1;                              // that compute load cases
+  bool true_extremes = false;                   // in place of smooth ones; not in values_on() and gradients_on()
 };
 
 class Evaluator {
@@ -103,6 +116,12 @@ class Evaluator {
   // CVODES cannot take given steps and throws std::invalid_argument. Not in load cases.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
   Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
+
+  // The poses of the last evaluation, which is at rho, become the guess of the next ones if the drives determine them:
+  // the mechanism stays in its assembly mode, also where the scene's own guess would lead to another one.
+  void follow(const Eigen::VectorXd& rho);
+  // Whether the scene's own guess leads to other poses at rho.
+  bool has_left_guess(const Eigen::VectorXd& rho) const;
 
   // The same objectives and variables of another scene, such as one with other tolerances.
   Evaluator in(Scene scene, GradientMethod method) const;
@@ -137,6 +156,7 @@ class Evaluator {
   // Parts of run(). They return false if the point cannot be evaluated; e.message then gives the reason.
   bool has_finite_parameters(Evaluation& e) const;
   bool add_simulated(Evaluation& e, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const;
+  bool add_extremes(Evaluation& e, Sweep sweep, bool by_cvodes) const;
   bool add_parameters_only(Evaluation& e) const;
   bool has_finite_objectives(Evaluation& e) const;
   GradientMethod chosen_method(std::string& choice) const;
@@ -149,6 +169,7 @@ class Evaluator {
   std::vector<int> variables_;
   EvaluatorOptions options_;
   std::shared_ptr<ScenePrograms> programs_;
+  std::shared_ptr<const Scene> given_;       // with its own guess, where another one is followed
   std::size_t simulated_ = 0;                // objectives that need a simulation
   std::vector<std::size_t> perhaps_unused_;  // variables that only what is written in C++ may use
   bool has_differentiated_ = false;          // gradients() has succeeded: no loop is a structure that cannot move

@@ -84,14 +84,15 @@ std::vector<Look> looks_of(const std::vector<Objective>& objectives, const StepS
 
 }  // namespace
 
-Hessians gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
+Hessians gauss_newton(const Evaluator& evaluator, const Evaluation& at, std::size_t count) {
   Hessians result;
   result.gradients = 1;
   if (!at.ok) {
     result.message = at.message;
     return result;
   }
-  const std::vector<Objective>& objectives = evaluator.objectives();
+  const std::vector<Objective>& all = evaluator.objectives();
+  const std::vector<Objective> objectives(all.begin(), count > 0 ? all.begin() + static_cast<Index>(count) : all.end());
   const std::vector<int>& variables = evaluator.variables();
   require_second_order(evaluator.scene(), GradientMethod::automatic);
   bool simulated = false;

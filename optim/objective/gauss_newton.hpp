@@ -21,6 +21,7 @@ namespace mbsopt::inline optim {
 // Uses the steps of the evaluation, with three Gauss points per step on the dense output for integrals. Errors of the
 // matrices are not known. Throws std::invalid_argument for objectives written in C++, which have no second derivatives,
 // and for CVODES' integrators.
-Hessians gauss_newton(const Evaluator& evaluator, const Evaluation& at);
+// objectives: only the first ones; 0: all.
+Hessians gauss_newton(const Evaluator& evaluator, const Evaluation& at, std::size_t objectives = 0);
 
 }  // namespace mbsopt::inline optim

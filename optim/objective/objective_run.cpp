@@ -6,61 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "core/cvodes/cvodes.hpp"
-#include "core/run/output_times.hpp"
+#include "optim/objective/peaks.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
-
-// The largest of successive values, and places where the value may be larger. Tops of parabolas through each three
-// values whose middle is highest are such places: between few points the value may be anything.
-class Peak {
- public:
-  void add(double t, double x) {
-    largest_ = std::max(largest_, x);
-    t_[0] = t_[1];
-    t_[1] = t_[2];
-    t_[2] = t;
-    x_[0] = x_[1];
-    x_[1] = x_[2];
-    x_[2] = x;
-    if (++count_ < 3 || x_[1] < x_[0] || x_[1] < x_[2]) return;
-    // x = x1 + b s + c s^2,  s = t - t1
-    const double s0 = t_[0] - t_[1], s2 = t_[2] - t_[1];
-    if (!(s0 < 0 && s2 > 0)) return;
-    const double d0 = (x_[0] - x_[1]) / s0, d2 = (x_[2] - x_[1]) / s2;
-    const double c = (d2 - d0) / (s2 - s0), b = d0 - c * s0;
-    if (!(c < 0)) return;
-    const double rise = kRise * (x_[1] - std::min(x_[0], x_[2]));
-    tops_.push_back({t_[0], t_[1] - b / (2 * c), t_[2], x_[1] - b * b / (4 * c), x_[1] + rise, t_[1]});
-  }
-  double largest() const { return largest_; }
-  void add_places(std::vector<double>& times) const {
-    for (const Top& top : tops_)
-      if (top.x > largest_) times.push_back(top.t);
-  }
-  // Takes the brackets of tops that may exceed the largest value by the part rtol of it, and halves their sides.
-  void refine(double rtol, std::vector<double>& times) {
-    for (const Top& top : tops_) {
-      if (!(std::max(top.x, top.bound) > largest_ + rtol * std::abs(largest_))) continue;
-      for (const double t : {top.t0, (top.t0 + top.t1) / 2, top.t1, (top.t1 + top.t2) / 2, top.t2, top.t})
-        times.push_back(t);
-    }
-    tops_.clear();
-    count_ = 0;
-  }
-
- private:
-  // A peak that three values do not resolve may rise above the middle one by a multiple of the rise to it.
-  static constexpr double kRise = 4;
-  struct Top {
-    double t0, t, t2, x, bound, t1;
-  };
-  double largest_ = -std::numeric_limits<double>::infinity();
-  double t_[3] = {}, x_[3] = {};
-  int count_ = 0;
-  std::vector<Top> tops_;
-};
 
 // The integral of one part of an objective.
 struct Integral {
@@ -84,46 +33,15 @@ std::vector<std::optional<double>> extremes_of(const std::vector<Integral>& inte
                                                const SimulationSettings& settings, const StepSequence& steps,
                                                const std::function<bool(double t)>& progress) {
   std::vector<std::optional<double>> values(integrals.size());
-  struct Tracked {
-    std::size_t index;
-    double side;
-    std::shared_ptr<const PointCost> x;
-    Peak peak;
-  };
-  std::vector<Tracked> tracked;
+  std::vector<Watched> watched;
+  std::vector<std::size_t> of;
   for (std::size_t i = 0; i < integrals.size(); ++i)
-    if (const int side = integrals[i].part.side; side != 0)
-      tracked.push_back({i, static_cast<double>(side), integrals[i].objective->expression(mechanism), {}});
-  if (tracked.empty()) return values;
-  Sampling sampling;
-  sampling.times = output_times(settings);  // no row of a trajectory exceeds a true extreme
-  for (std::size_t i = 0; i < steps.times.size(); ++i) {
-    const double points = std::max(8.0, std::ceil(steps.sizes[i] / settings.integrator.max_step.value_or(INFINITY)));
-    for (double j = 0; j < points; ++j) sampling.times.push_back(steps.times[i] + j * steps.sizes[i] / points);
-  }
-  sampling.observe = [&](std::size_t, const StatePoint& at) {
-    for (Tracked& t : tracked) t.peak.add(at.t, t.side * t.x->value(at));
-  };
-  // CVODES takes its own steps again.
-  const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, progress};
-  // Integrated runs have dense output that their steps resolve. Solved ones may have narrow peaks: their brackets are
-  // halved as often as a hundredth of the run needs for 1e-4 of itself.
-  constexpr int kHalvings = 14;
-  for (int halvings = 0;; ++halvings) {
-    std::sort(sampling.times.begin(), sampling.times.end());
-    sampling.times.erase(std::unique(sampling.times.begin(), sampling.times.end()), sampling.times.end());
-    const SimulationResult run = simulate(mechanism, settings, {}, sampling, options);
-    if (!run.ok()) return values;
-    sampling.times.clear();
-    const bool last = halvings == (run.statistics.solved ? kHalvings : 1);
-    for (Tracked& t : tracked) {
-      if (last) continue;
-      run.statistics.solved ? t.peak.refine(settings.integrator.rtol, sampling.times)
-                            : t.peak.add_places(sampling.times);
+    if (const int side = integrals[i].part.side; side != 0) {
+      watched.push_back({side, integrals[i].objective->expression(mechanism)});
+      of.push_back(i);
     }
-    if (sampling.times.empty()) break;
-  }
-  for (const Tracked& t : tracked) values[t.index] = t.side * t.peak.largest();
+  const std::vector<std::vector<Peak>> found = peaks(watched, mechanism, settings, steps, progress);
+  for (std::size_t k = 0; k < found.size(); ++k) values[of[k]] = found[k].front().value;
   return values;
 }
 

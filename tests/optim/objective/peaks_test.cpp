@@ -1,0 +1,90 @@
+// True extremes, their peaks one by one, and the gradients of these.
+#include "optim/objective/peaks.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "optim/objective/evaluator.hpp"
+#include "tests/core/mechanism/one_coordinate.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+
+namespace {
+
+// x = a cos(w t), w = sqrt(k), on a spring, over 2.9 turns; extremes of x and of its rate.
+Evaluator swinging(GradientMethod method, bool is_true = true) {
+  Scene s = swinging_mass({{"a", 0.2}, {"k", 4}}, "-k*x", 2.9 * 3.14159265358979, 1e-11);
+  s.sensors.push_back(point_sensor("v", "velocity", "mass", vec("0", "0", "0"), "x"));
+  std::vector<Objective> objectives;
+  const auto add = [&](const char* kind, const char* of) {
+    ObjectiveSpec spec;
+    spec.name = std::string(kind) + of;
+    spec.mean(kind) = f(of);
+    objectives.emplace_back(s, spec);
+  };
+  add("maximum_of", "v");
+  add("minimum_of", "x + 0.01*t");  // the second valley is 0.03 above the first one
+  add("peak_to_peak_of", "v");
+  ObjectiveSpec integral;
+  integral.name = "integral", integral.running = f("x^2");
+  objectives.emplace_back(s, integral);
+  EvaluatorOptions options;
+  options.method = method;
+  options.true_extremes = is_true;
+  return Evaluator(std::move(s), std::move(objectives), {"a", "k"}, options);
+}
+
+}  // namespace
+
+TEST_CASE("true extremes and their gradients are those of a cosine", "[peaks]") {
+  Evaluator evaluator = swinging(GENERATE(GradientMethod::tlm, GradientMethod::adjoint));
+  const double a = 0.2, w = 2;
+  const Evaluation e = evaluator.gradients(evaluator.start());
+  REQUIRE(e.ok);
+  CHECK(e.psi(0) == Approx(a * w).epsilon(1e-9));
+  CHECK(e.psi_rho(0, 0) == Approx(w).epsilon(1e-7));
+  CHECK(e.psi_rho(0, 1) == Approx(a / (2 * w)).epsilon(1e-6));
+  CHECK(e.psi(2) == Approx(2 * a * w).epsilon(1e-9));
+  CHECK(e.psi_rho(2, 0) == Approx(2 * w).epsilon(1e-7));
+  // a cos(w t) + 0.01 t is stationary at sin(w t) = 0.01/(a w).
+  const double phase = 3.14159265358979 - std::asin(0.01 / (a * w)), t = phase / w;
+  CHECK(e.psi(1) == Approx(a * std::cos(phase) + 0.01 * t).epsilon(1e-9));
+  CHECK(e.psi_rho(1, 0) == Approx(std::cos(phase)).epsilon(1e-6));
+  CHECK(e.psi_rho(1, 1) == Approx(-a * t * std::sin(phase) / (2 * w)).epsilon(1e-4));
+}
+
+TEST_CASE("an extreme comes with its peaks, the most extreme one first", "[peaks]") {
+  Evaluator evaluator = swinging(GradientMethod::tlm);
+  const Evaluation e = evaluator.gradients(evaluator.start());
+  std::vector<ExtremePiece> valleys;
+  for (const ExtremePiece& piece : e.pieces)
+    if (piece.row == 1) valleys.push_back(piece);
+  REQUIRE(valleys.size() >= 3);  // one per turn
+  CHECK(valleys[0].side == -1);
+  CHECK(valleys[0].value == e.psi(1));
+  CHECK(valleys[0].gradient.transpose() == e.psi_rho.row(1));
+  const double turn = 3.14159265358979;  // of w = 2
+  CHECK(valleys[1].t - valleys[0].t == Approx(turn).epsilon(1e-5));
+  CHECK(valleys[1].value - valleys[0].value == Approx(0.01 * turn).epsilon(1e-6));
+}
+
+TEST_CASE("gradients of true extremes are the differences of free runs", "[peaks]") {
+  Evaluator evaluator = swinging(GradientMethod::tlm);
+  const Evaluation e = evaluator.gradients(evaluator.start());
+  for (const Eigen::Index k : {0, 1}) {
+    const Eigen::VectorXd h = 1e-4 * evaluator.start()(k) * Eigen::VectorXd::Unit(2, k);
+    const Evaluation plus = evaluator.values(evaluator.start() + h), minus = evaluator.values(evaluator.start() - h);
+    for (const Eigen::Index i : {0, 1, 2, 3})
+      CHECK((plus.psi(i) - minus.psi(i)) / (2 * h(k)) == Approx(e.psi_rho(i, k)).epsilon(1e-5).margin(1e-6));
+  }
+}
+
+TEST_CASE("other objectives do not change beside true extremes", "[peaks]") {
+  Evaluator exact = swinging(GradientMethod::tlm), smooth = swinging(GradientMethod::tlm, false);
+  const Evaluation a = exact.gradients(exact.start()), b = smooth.gradients(smooth.start());
+  CHECK(a.psi(3) == Approx(b.psi(3)).epsilon(1e-12));
+  CHECK((a.psi_rho.row(3) - b.psi_rho.row(3)).norm() < 1e-10);
+  CHECK(b.pieces.empty());
+  CHECK(b.psi(0) < a.psi(0));  // the smooth maximum is below
+}
