@@ -13,6 +13,7 @@ set(public
   optim/design/design.hpp optim/fit/identification.hpp optim/check/gradient_check.hpp
   optim/tradeoff/tradeoff.hpp optim/tradeoff/advice.hpp optim/tradeoff/accuracy.hpp
   optim/solver/nonlinear_program.hpp optim/solver/ipopt_solver.hpp optim/solver/nlopt_solver.hpp
+  optim/solver/sqp_solver.hpp
   optim/problem/named_terms.hpp app/json/read_problem.hpp app/program.hpp)
 # Public, but not in mbsopt.hpp, which would take longer to compile.
 set(apart core/body/euler_parameters.hpp core/force/differentiated_force.hpp core/run/differentiated_cost.hpp

@@ -29,6 +29,17 @@ struct NlpScale {
 
 enum class Wanted { values, derivatives };
 
+// Where f or c_i is the largest, or least, of several functions: one of them, with its value. A search that sees all
+// that come near the extreme knows on which side of a kink it is.
+struct NlpPiece {
+  static constexpr Eigen::Index kObjective = -1;
+  Eigen::Index row = 0;  // of c; kObjective - g: of the g-th extreme that f is a sum of
+  int side = 1;          // of the largest, -1: of the least
+  double value = 0;      // in the size of its part in f or c
+  Eigen::VectorXd gradient;
+  double mark = 0;  // the nearest mark at another point belongs to the same function
+};
+
 struct NlpPoint {
   bool ok = true;
   bool abandoned = false;  // not ok because the user stopped it: that says nothing about x
@@ -37,6 +48,8 @@ struct NlpPoint {
   Eigen::VectorXd f_x;  // n
   Eigen::VectorXd c;    // m
   Eigen::MatrixXd c_x;  // m x n
+  // Derivatives of f and c are those of their first pieces. Empty where all are smooth.
+  std::vector<NlpPiece> pieces;
 };
 
 struct NonlinearProgram {
@@ -58,6 +71,8 @@ struct NonlinearProgram {
     point.c_x.setZero(constraints(), x.size());
     evaluate(x, point);
   }
+  // A local search went on to x, which it evaluated last: what it tries next is near.
+  virtual void moved_to(const Eigen::VectorXd&) {}
   // Sets second derivatives of f, then of each c: n x n each. Returns false if there are none.
   virtual bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>&) { return false; }
 

@@ -22,11 +22,12 @@ bool near(double value, double bound) {
   return std::isfinite(bound) && std::abs(value - bound) <= kNear * std::max(1.0, std::abs(bound));
 }
 
-// Columns of non-negative multipliers: sign * gradient of constraint i.
+// Columns of non-negative multipliers: sign * gradient of constraint i, or of a piece of f.
 struct Multiplier {
-  Index constraint;
+  Index constraint;  // NlpPiece::row
   double sign;
-  double slack;
+  double slack;  // scaled
+  VectorXd column;
 };
 
 // min |A z - b| subject to z >= 0.
@@ -43,8 +44,7 @@ struct NearBounds {
   Index count() const { return static_cast<Index>(constraints.size()); }
 };
 
-NearBounds near_bounds(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point,
-                       std::vector<Multiplier> constraints) {
+NearBounds near_bounds(const NonlinearProgram& problem, const VectorXd& x, std::vector<Multiplier> constraints) {
   NearBounds found;
   found.constraints = std::move(constraints);
   for (Index k = 0; k < x.size(); ++k) {
@@ -53,44 +53,91 @@ NearBounds near_bounds(const NonlinearProgram& problem, const VectorXd& x, const
   }
   found.columns.setZero(x.size(), found.count() + static_cast<Index>(found.variables.size()));
   for (Index j = 0; j < found.count(); ++j) {
-    const Multiplier& y = found.constraints[static_cast<std::size_t>(j)];
-    found.columns.col(j) = y.sign * problem.c_scale(y.constraint) * point.c_x.row(y.constraint).transpose();
+    found.columns.col(j) = found.constraints[static_cast<std::size_t>(j)].column;
   }
   for (std::size_t j = 0; j < found.variables.size(); ++j)
     found.columns(found.variables[j].first, found.count() + static_cast<Index>(j)) = found.variables[j].second;
   return found;
 }
 
+// The bounds of constraint i that are near; those of each piece where it has some on that side.
+void add_near(const NonlinearProgram& problem, const NlpPoint& point, Index i, std::vector<Multiplier>& found) {
+  const double scale = problem.c_scale(i);
+  for (const double side : {1., -1.}) {
+    const double bound = side > 0 ? problem.c_upper(i) : problem.c_lower(i);
+    bool has_pieces = false;
+    for (const NlpPiece& piece : point.pieces) {
+      if (piece.row != i || piece.side != side) continue;
+      has_pieces = true;
+      if (near(piece.value, bound))
+        found.push_back({i, side, scale * std::abs(bound - piece.value), side * scale * piece.gradient});
+    }
+    if (!has_pieces && near(point.c(i), bound))
+      found.push_back({i, side, scale * std::abs(bound - point.c(i)), side * scale * point.c_x.row(i).transpose()});
+  }
+}
+
+// The pieces of f that come near the largest of their extreme: y moves its weight from that one to them.
+void add_near_pieces(const NonlinearProgram& problem, const NlpPoint& point, std::vector<Multiplier>& found) {
+  const NlpPiece* top = nullptr;
+  for (const NlpPiece& piece : point.pieces) {
+    if (piece.row >= 0) continue;
+    if (!top || top->row != piece.row) {
+      top = &piece;
+      continue;
+    }
+    const double slack = problem.f_scale * std::abs(top->value - piece.value);
+    if (slack <= kNear * std::max(1.0, problem.f_scale * std::abs(top->value)))
+      found.push_back({piece.row, 1, slack, problem.f_scale * (piece.gradient - top->gradient)});
+  }
+}
+
 }  // namespace
 
-Stationarity stationarity(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point) {
-  VectorXd r = problem.f_scale * point.f_x;
-  std::vector<Multiplier> multipliers;
-  for (Index i = 0; i < problem.constraints(); ++i) {
-    const double c = point.c(i), lower = problem.c_lower(i), upper = problem.c_upper(i);
-    if (near(c, upper)) multipliers.push_back({i, 1, upper - c});
-    if (near(c, lower)) multipliers.push_back({i, -1, c - lower});
-  }
+namespace {
+
+// slacks: how much multiplier times slack counts beside r.
+Stationarity balanced(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point,
+                      const NearBounds& bounds, double slacks) {
   Stationarity found;
   found.multipliers.setZero(problem.constraints());
   found.pulls.setZero(problem.constraints());
+  MatrixXd A = MatrixXd::Zero(x.size() + bounds.count(), bounds.columns.cols());
+  A.topRows(x.size()) = bounds.columns;
+  for (Index j = 0; j < bounds.count(); ++j)
+    A(x.size() + j, j) = slacks * bounds.constraints[static_cast<std::size_t>(j)].slack;
+  VectorXd b = VectorXd::Zero(A.rows());
+  b.head(x.size()) = -problem.f_scale * point.f_x;
+  VectorXd y = VectorXd::Zero(bounds.count());
+  if (bounds.count() > 0) y = non_negative_least_squares(A, b).head(bounds.count());
+  const VectorXd r = problem.f_scale * point.f_x + bounds.columns.leftCols(bounds.count()) * y;
   double complementarity = 0;
-  if (!multipliers.empty()) {
-    const NearBounds bounds = near_bounds(problem, x, point, std::move(multipliers));
-    const VectorXd y = non_negative_least_squares(bounds.columns, -r).head(bounds.count());
-    r += bounds.columns.leftCols(bounds.count()) * y;
-    for (Index j = 0; j < bounds.count(); ++j) {
-      const Multiplier& multiplier = bounds.constraints[static_cast<std::size_t>(j)];
-      found.multipliers(multiplier.constraint) += multiplier.sign * y(j);
-      complementarity =
-          std::max(complementarity, y(j) * problem.c_scale(multiplier.constraint) * std::abs(multiplier.slack));
-    }
+  for (Index j = 0; j < bounds.count(); ++j) {
+    const Multiplier& multiplier = bounds.constraints[static_cast<std::size_t>(j)];
+    if (multiplier.constraint >= 0) found.multipliers(multiplier.constraint) += multiplier.sign * y(j);
+    complementarity = std::max(complementarity, y(j) * multiplier.slack);
   }
   for (Index i = 0; i < problem.constraints(); ++i)
     found.pulls(i) = std::abs(found.multipliers(i)) * problem.c_scale(i) * point.c_x.row(i).lpNorm<Eigen::Infinity>();
   const VectorXd step = (-r).cwiseMin(problem.x_upper - x).cwiseMax(problem.x_lower - x);
   found.distance = std::max(step.cwiseAbs().maxCoeff(), complementarity);
   return found;
+}
+
+}  // namespace
+
+// Among several bounds with one gradient the multipliers may be those of distant ones. Then they are chosen again, by
+// slacks, too. Otherwise as few of them as possible are above 0.
+Stationarity stationarity(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point) {
+  constexpr double kClearly = 0.1;
+  std::vector<Multiplier> multipliers;
+  add_near_pieces(problem, point, multipliers);
+  for (Index i = 0; i < problem.constraints(); ++i) add_near(problem, point, i, multipliers);
+  const NearBounds bounds = near_bounds(problem, x, std::move(multipliers));
+  Stationarity by_r = balanced(problem, x, point, bounds, 0);
+  if (bounds.count() == 0) return by_r;
+  Stationarity by_slacks = balanced(problem, x, point, bounds, 1);
+  return by_slacks.distance < kClearly * by_r.distance ? by_slacks : by_r;
 }
 
 double optimality(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point) {
@@ -110,10 +157,9 @@ Conflict conflict(const NonlinearProgram& problem, const VectorXd& x, const NlpP
       V_x += found.of_constraints(i) * point.c_x.row(i).transpose();
       continue;
     }
-    if (near(point.c(i), problem.c_upper(i))) others.push_back({i, 1, -above});
-    if (near(point.c(i), problem.c_lower(i))) others.push_back({i, -1, -below});
+    add_near(problem, point, i, others);
   }
-  const NearBounds bounds = near_bounds(problem, x, point, std::move(others));
+  const NearBounds bounds = near_bounds(problem, x, std::move(others));
   const VectorXd z = non_negative_least_squares(bounds.columns, -V_x);
   for (Index j = 0; j < bounds.count(); ++j) {
     const Multiplier& multiplier = bounds.constraints[static_cast<std::size_t>(j)];
