@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 
+#include "core/cvodes/cvodes.hpp"
 #include "optim/objective/design_issues.hpp"
 #include "optim/objective/gauss_newton.hpp"
 #include "optim/objective/hessian.hpp"
@@ -22,6 +24,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Of the size of a limit on a true extreme: another look at the run may find one that is larger by rounding.
+constexpr double kInsideExtremes = 5e-7;
 
 double inverse(double x) { return x > 0 && std::isfinite(x) ? 1 / x : 1; }
 
@@ -40,10 +45,10 @@ const DesignSpec& checked(const Problem& problem) {
   if (!problem.design) throw std::invalid_argument("design: is missing; it says what to minimise and what to vary");
   const DesignSpec& spec = *problem.design;
   if (spec.variables.empty()) throw std::invalid_argument("design.variables: is empty; name at least one parameter");
-  const bool is_known = spec.optimizer.type == "ipopt" || spec.optimizer.type == OptimizerSpec::kLeastSquares ||
-                        find_nlopt_method(spec.optimizer.type);
+  const bool is_known = spec.optimizer.is_sqp() || spec.optimizer.asks_for_ipopt() ||
+                        spec.optimizer.type == OptimizerSpec::kLeastSquares || find_nlopt_method(spec.optimizer.type);
   if (!is_known)
-    throw std::invalid_argument(fmt::format("design.optimizer.type: is '{}'; available: ipopt {} {}",
+    throw std::invalid_argument(fmt::format("design.optimizer.type: is '{}'; available: auto sqp ipopt {} {}",
                                             spec.optimizer.type, OptimizerSpec::kLeastSquares, nlopt_method_names()));
   for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
     const ObjectiveBound& bound = spec.subject_to[i];
@@ -65,8 +70,9 @@ Problem with_named_means(Problem problem) {
   return problem;
 }
 
-EvaluatorOptions evaluator_options(const DesignOptions& options) {
+EvaluatorOptions evaluator_options(const DesignSpec& spec, const DesignOptions& options) {
   EvaluatorOptions result;
+  result.true_extremes = spec.optimizer.is_sqp();
   result.method = options.method;
   result.user_forces = options.user_forces;
   result.threads = options.threads;
@@ -75,6 +81,19 @@ EvaluatorOptions evaluator_options(const DesignOptions& options) {
 }
 
 }  // namespace
+
+// Whether Gauss-Newton's matrix tells more of the objective than nothing.
+bool sums_squares(const Problem& problem, const DesignSpec& spec, const Evaluator& evaluator) {
+  if (!spec.optimizer.is_sqp() || is_cvodes(problem.scene.simulation.integrator.type)) return false;
+  if (spec.over == "max" && problem.cases.size() > 1) return false;
+  for (std::size_t c = 0; c < evaluator.cases(); ++c) {
+    const Objective& objective = evaluator.of_case(c).objectives()[0];
+    if (objective.is_extreme() || objective.is_linear() || objective.is_eigenvalue() || objective.is_written_in_cpp() ||
+        objective.free_instants())
+      return false;
+  }
+  return true;
+}
 
 std::vector<std::string> objective_names(const DesignSpec& spec) {
   std::vector<std::string> names{spec.minimize};
@@ -86,15 +105,16 @@ DesignProgram::DesignProgram(const Problem& problem, const DesignOptions& option
     : NonlinearProgram(0, 0),
       problem_(with_named_means(problem)),
       spec_(checked(problem_)),
-      evaluator_(problem_, objective_names(spec_), spec_.variables, evaluator_options(options)),
+      evaluator_(problem_, objective_names(spec_), spec_.variables, evaluator_options(spec_, options)),
       scaling_(designed(), felt_changes()),
       x_start_(scaling_.to_x(evaluator_.start()(evaluator_.variables()))),
       bounds_(static_cast<Index>(spec_.subject_to.size())),
       abandoned_(std::move(abandoned)),
-      gauss_newton_(spec_.optimizer.hessian == "gauss_newton") {
+      has_squares_(sums_squares(problem_, spec_, evaluator_)),
+      gauss_newton_(has_squares_ || spec_.optimizer.hessian == "gauss_newton") {
   x_lower = scaling_.x_lower();
   x_upper = scaling_.x_upper();
-  if (!spec_.sharpness) spec_.sharpness = sharpness();
+  if (!spec_.sharpness && !spec_.optimizer.is_sqp()) spec_.sharpness = sharpness();
   objective_ = CaseObjective(problem_.cases, spec_);
   const Index m = bounds_ * static_cast<Index>(evaluator_.cases());
   c_lower.setConstant(m, -kInfinity);
@@ -205,6 +225,11 @@ Evaluation DesignProgram::start_from(const VectorXd& x_start, const std::optiona
   const NlpScale scale = given ? *given : scale_at(x_start);
   f_scale = scale.f;
   c_scale = scale.c;
+  for (Index i = 0; i < constraints(); ++i) {
+    if (bound(i).lower.value_or(0) != 0 || bound(i).upper.value_or(0) != 0) continue;
+    size_(i) = 1 / c_scale(i);  // bounds of 0 have no size; this is what variables of size 1 alter
+    c_scale(i) = 1;
+  }
   const Evaluation start = evaluator_.gradients(rho_at(x_start));  // in memory, unless the scale is given
   if (start.ok) {
     best_ = start;
@@ -218,6 +243,10 @@ void DesignProgram::set_bounds(Index constraint, const std::optional<double>& lo
                                const std::optional<double>& upper) {
   c_lower(constraint) = lower.value_or(-kInfinity) / size_(constraint);
   c_upper(constraint) = upper.value_or(kInfinity) / size_(constraint);
+  if (spec_.optimizer.is_sqp() && limited(constraint).is_extreme() && c_lower(constraint) < c_upper(constraint)) {
+    c_lower(constraint) += kInsideExtremes;
+    c_upper(constraint) -= kInsideExtremes;
+  }
   if (best_.ok) best_violations_ = violations_of(best_);
 }
 
@@ -248,12 +277,47 @@ void DesignProgram::fill(const Evaluation& e, const VectorXd& x, NlpPoint& point
     point.f_x = f_rho(e).cwiseProduct(rho_x);
     for (Index i = 0; i < constraints(); ++i)
       point.c_x.row(i) = e.psi_rho.row(psi_of(i)).cwiseProduct(rho_x.transpose()) / size_(i);
+    add_pieces(e, rho_x, point);
   }
   const double violations = violations_of(e);
   if (best_.ok && !is_better(point.f, violations, best_f_, best_violations_)) return;
   best_ = e;
   best_f_ = point.f;
   best_violations_ = violations;
+}
+
+// A sum over cases has an extreme for each of them; their maximum has one, of the pieces of all.
+void DesignProgram::add_pieces(const Evaluation& e, const VectorXd& rho_x, NlpPoint& point) const {
+  const Index stride = 1 + bounds_;
+  const bool is_maximum = objective_.is_true_maximum();
+  const auto apart = [](Index c) { return 1e3 * static_cast<double>(c); };
+  std::vector<NlpPiece> of_maximum;
+  std::vector<bool> has_pieces(evaluator_.cases(), false);
+  const VectorXd weights = is_maximum ? objective_.weights() : objective_.gradient(minimised(e.psi));
+  for (const ExtremePiece& piece : e.pieces) {
+    const Index c = piece.row / stride, k = piece.row % stride;
+    const VectorXd gradient = piece.gradient.cwiseProduct(rho_x);
+    if (k > 0) {
+      const Index constraint = c * bounds_ + k - 1;
+      point.pieces.push_back(
+          {constraint, piece.side, piece.value / size_(constraint), gradient / size_(constraint), piece.t});
+      continue;
+    }
+    has_pieces[static_cast<std::size_t>(c)] = true;
+    if (piece.side < 0) continue;  // the least of several: a search that lowers it sees one of them
+    const NlpPiece of_f{is_maximum ? NlpPiece::kObjective : NlpPiece::kObjective - c, 1, weights(c) * piece.value,
+                        weights(c) * gradient, piece.t + apart(c)};
+    (is_maximum ? of_maximum : point.pieces).push_back(of_f);
+  }
+  if (!is_maximum) return;
+  for (std::size_t c = 0; c < has_pieces.size(); ++c) {
+    const Index row = row_of(c), of_case = static_cast<Index>(c);
+    if (!has_pieces[c])
+      of_maximum.push_back({NlpPiece::kObjective, 1, weights(of_case) * e.psi(row),
+                            weights(of_case) * e.psi_rho.row(row).transpose().cwiseProduct(rho_x), apart(of_case)});
+  }
+  std::ranges::stable_sort(of_maximum, std::greater(), &NlpPiece::value);
+  std::ranges::move(of_maximum, std::back_inserter(point.pieces));
 }
 
 void DesignProgram::evaluate(const VectorXd& x, NlpPoint& point) { fill(evaluation(rho_at(x)), x, point); }
@@ -272,8 +336,8 @@ bool DesignProgram::second_derivatives(const Evaluation& at, std::vector<MatrixX
   std::vector<Hessians> found(evaluator_.cases());
   evaluator_.for_each_case([&](std::size_t c) {
     Evaluator& evaluator = evaluator_.of_case(c);
-    found[c] =
-        gauss_newton_ ? gauss_newton(evaluator, at.of_case(c)) : mbsopt::hessians(evaluator, at.rho, for_steps());
+    found[c] = gauss_newton_ ? gauss_newton(evaluator, at.of_case(c), has_squares_ ? 1 : 0)
+                             : mbsopt::hessians(evaluator, at.rho, for_steps());
   });
   bool ok = true;
   for (Hessians& of_case : found) {
@@ -298,6 +362,12 @@ bool DesignProgram::hessians(const VectorXd& x, std::vector<MatrixXd>& H) {
   };
   // f_rhorho = sum of f_psi psi_rhorho + psi_rho' f_psipsi psi_rho
   const VectorXd psi = minimised(at.psi), slopes = objective_.gradient(psi);
+  if (has_squares_) {
+    MatrixXd squares = MatrixXd::Zero(x.size(), x.size());
+    for (Index c = 0; c < slopes.size(); ++c) squares += slopes(c) * of_psi(c);
+    H = {in_x(squares, f_rho(at))};
+    return true;
+  }
   MatrixXd f_rhorho = slopes(0) * of_psi(0);
   for (std::size_t c = 1; c < evaluator_.cases(); ++c) f_rhorho += slopes(static_cast<Index>(c)) * of_psi(row_of(c));
   if (objective_.is_maximum()) {

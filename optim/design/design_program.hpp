@@ -37,6 +37,9 @@ class DesignProgram : public NonlinearProgram {
   void evaluate(const Eigen::VectorXd& x, NlpPoint& point) override;
   void evaluate_values(const Eigen::VectorXd& x, NlpPoint& point) override;
   bool hessians(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override;
+  void moved_to(const Eigen::VectorXd& x) override { evaluator_.follow(rho_at(x)); }
+  // Whether hessians() are Gauss-Newton's, of the objective alone, because it is a sum over squares or the like.
+  bool has_squares() const { return has_squares_; }
 
   // The evaluation with gradients at rho: the one that was kept, or a new one.
   Evaluation evaluation(const Eigen::VectorXd& rho);
@@ -69,6 +72,7 @@ class DesignProgram : public NonlinearProgram {
   NlpScale scale_at(const Eigen::VectorXd& x_start);
   bool second_derivatives(const Evaluation& at, std::vector<Eigen::MatrixXd>& psi_rhorho);
   void fill(const Evaluation& e, const Eigen::VectorXd& x, NlpPoint& point);
+  void add_pieces(const Evaluation& e, const Eigen::VectorXd& rho_x, NlpPoint& point) const;
   double violations_of(const Evaluation& e) const;
   Eigen::Index row_of(std::size_t load_case) const;  // in an evaluation, of the objective that is minimised
   Eigen::VectorXd f_rho(const Evaluation& e) const;
@@ -86,7 +90,7 @@ class DesignProgram : public NonlinearProgram {
   double best_f_ = 0, best_violations_ = 0;
   long hessian_gradients_ = 0;
   std::string hessian_failure_;
-  const bool gauss_newton_;
+  const bool has_squares_, gauss_newton_;
 };
 
 std::vector<std::string> objective_names(const DesignSpec& spec);  // what is minimised, then what is bounded

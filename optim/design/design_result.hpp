@@ -91,9 +91,12 @@ struct DesignResult : SolverOutcome {
   long simulations = 0;         // also those of second derivatives
   double wall_seconds = 0;
   std::vector<std::string> warnings;  // sentences
-  std::optional<DesignMode> mode;     // where one was asked for
+  std::optional<DesignMode> mode;     // where one was asked for, or the poses of the scene do not lead to the end's
   int closing_steps = 0;              // that led a start which does not close to one that does (closing.hpp)
-  bool is_at_boundary() const;        // a bound of a variable, or a limit, holds the solution back or just holds
+  // Adds the work of an earlier search, and starts where that one did.
+  void add_work_of(const DesignResult& earlier);
+  void prepend(std::vector<DesignRow> rows);  // of an earlier search
+  bool is_at_boundary() const;  // a bound of a variable, or a limit, holds the solution back or just holds
   bool ok() const {
     return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||
            status == SolverStatus::no_progress || status == SolverStatus::searched;

@@ -15,6 +15,7 @@
 #include "optim/machine/stopwatch.hpp"
 #include "optim/objective/gradient_doubts.hpp"
 #include "optim/objective/integration_error.hpp"
+#include "optim/solver/nlopt_methods.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
@@ -96,7 +97,7 @@ class SingleDesign {
   long simulations() const { return program_.evaluator().simulations() + program_.hessian_gradients(); }
 
   void begin() {
-    result_.optimizer = program_.spec().optimizer.type;
+    result_.optimizer = program_.spec().optimizer.chosen();
     start_ = program_.start_from(program_.x_start(), options_.scale);
     result_.scale = {program_.f_scale, program_.c_scale};
     result_.gradient_choice = start_.choice.empty() ? std::string(to_string(start_.method)) : start_.choice;
@@ -120,9 +121,20 @@ class SingleDesign {
     result_.rho = program_.rho_at(result_.x);
   }
 
+  // The scene with the poses that the search has followed, if its own lead to others.
+  void describe_poses() {
+    if (!program_.evaluator().has_left_guess(result_.rho)) return;
+    std::vector<Body> bodies = program_.problem().scene.bodies;
+    for (const Body& followed : program_.evaluator().of_case(0).scene().bodies)
+      for (Body& body : bodies)
+        if (body.name == followed.name) body = followed;
+    result_.mode = DesignMode{0, 1, std::move(bodies)};
+  }
+
   // The end point of a stopped search is evaluated as well; nothing abandons that.
   void describe_last_point() {
     describe_end(program_, rounds_.solution, result_);
+    describe_poses();
     if (abandoned_ && !options_.evaluate_stopped) return;
     is_describing_ = true;
     if (abandoned_ || rounds_.true_values.empty()) rounds_.true_values = program_.evaluator().true_values(result_.rho);
@@ -153,8 +165,51 @@ class SingleDesign {
 
 }  // namespace
 
+namespace {
+
+// What an optimiser may still spend; nothing if that is nothing.
+bool take_off(const DesignResult& spent, OptimizerSpec& spec) {
+  if (spec.max_iterations) *spec.max_iterations -= spent.iterations;
+  if (spec.max_evaluations) *spec.max_evaluations -= spent.evaluations;
+  return spec.max_iterations.value_or(1) > 0 && spec.max_evaluations.value_or(1) > 0;
+}
+
+}  // namespace
+
+// Where sqp finds no point near that satisfies the limits, Ipopt on smooth extremes may come to another valley from the
+// same start. Where another local method stalls, or does not reach the limits, sqp goes on from its end.
 DesignResult single_design(const Problem& problem, const DesignOptions& options) {
-  return SingleDesign(problem, options).run();
+  DesignResult result = SingleDesign(problem, options).run();
+  const OptimizerSpec& spec = problem.design->optimizer;
+  const bool stalled = result.status == SolverStatus::no_progress && !spec.is_sqp();
+  Problem again = problem;
+  OptimizerSpec& next = again.design->optimizer = {};
+  next.type = spec.is_sqp() ? "ipopt" : "sqp";
+  next.tolerance = spec.tolerance;
+  next.max_iterations = spec.max_iterations;
+  next.max_evaluations = spec.max_evaluations;
+  const NloptMethod* const method = find_nlopt_method(spec.type);
+  if ((result.status != SolverStatus::infeasible && !stalled) || spec.type == "sqp" || (method && method->global) ||
+      !take_off(result, next))
+    return result;
+  DesignOptions without_comparison = options;
+  without_comparison.compare_differences = false;
+  if (!spec.is_sqp())
+    for (std::size_t p = 0; p < again.scene.parameters.size(); ++p)
+      again.scene.parameters[p].value = result.rho(static_cast<Eigen::Index>(p));
+  DesignResult other = SingleDesign(again, without_comparison).run();
+  if (!other.ok() || (stalled && other.status != SolverStatus::converged)) {
+    result.iterations += other.iterations;
+    result.evaluations += other.evaluations;
+    result.failed_evaluations += other.failed_evaluations;
+    result.simulations += other.simulations;
+    result.wall_seconds += other.wall_seconds;
+    if (other.status == SolverStatus::stopped) result.end(other.status, other.message);
+    return result;
+  }
+  other.add_work_of(result);
+  other.prepend(std::move(result.history));
+  return other;
 }
 
 }  // namespace mbsopt::inline optim

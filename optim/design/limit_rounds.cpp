@@ -12,6 +12,7 @@
 #include "optim/solver/nlopt_methods.hpp"
 #include "optim/solver/nlopt_solver.hpp"
 #include "optim/solver/optimality.hpp"
+#include "optim/solver/sqp_solver.hpp"
 
 namespace mbsopt::inline optim {
 namespace {
@@ -42,6 +43,18 @@ NlpResult solved_with_ipopt(DesignProgram& program, const Eigen::VectorXd& x_sta
   return solution;
 }
 
+NlpResult solved_with_sqp(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
+                          const SearchHooks& hooks) {
+  SqpOptions solver;
+  solver.tolerance = spec.tolerance;
+  solver.constraint_tolerance = kConstraintTolerance;
+  solver.max_evaluations = spec.max_evaluations;
+  solver.progress = hooks.progress;
+  if (spec.max_iterations) solver.max_iterations = static_cast<int>(*spec.max_iterations);
+  solver.has_hessians = program.has_squares();
+  return solve_with_sqp(program, x_start, solver);
+}
+
 NlpResult solved_with_nlopt(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
                             const SearchHooks& hooks, std::optional<long>& seed) {
   NloptOptions solver = common_options<NloptOptions>(spec, hooks);
@@ -58,7 +71,8 @@ NlpResult solved_once(DesignProgram& program, const Eigen::VectorXd& x_start, co
                       const SearchHooks& hooks, DesignResult& result) {
   if (spec.type == OptimizerSpec::kLeastSquares)
     return solve_tracked_squares(program, x_start, spec, hooks.progress, result.simulations);
-  if (spec.type == "ipopt") return solved_with_ipopt(program, x_start, spec, hooks);
+  if (spec.is_sqp()) return solved_with_sqp(program, x_start, spec, hooks);
+  if (spec.asks_for_ipopt()) return solved_with_ipopt(program, x_start, spec, hooks);
   return solved_with_nlopt(program, x_start, spec, hooks, result.seed);
 }
 
@@ -66,7 +80,7 @@ NlpResult solved_once(DesignProgram& program, const Eigen::VectorXd& x_start, co
 OptimizerSpec remaining(OptimizerSpec spec, const NlpResult& done) {
   const NloptMethod* const method = find_nlopt_method(spec.type);
   if (method && method->global) return spec;
-  if (!method) spec.max_iterations = spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations);
+  if (spec.asks_for_ipopt()) spec.max_iterations = spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations);
   if (spec.max_iterations) *spec.max_iterations = std::max(0L, *spec.max_iterations - done.iterations);
   if (spec.max_evaluations) *spec.max_evaluations = std::max(0L, *spec.max_evaluations - done.evaluations);
   return spec;
@@ -151,8 +165,8 @@ void solve_again(DesignProgram& program, const SearchHooks& hooks, NlpResult& so
 Eigen::VectorXi binding_sides(const OptimizerSpec& spec, const DesignProgram& program, const NlpResult& solution) {
   const NloptMethod* const method = find_nlopt_method(spec.type);
   Eigen::VectorXi sides = Eigen::VectorXi::Zero(program.constraints());
-  const bool holds_equalities = spec.type == "ipopt" || (method && method->gradients && !method->global &&
-                                                         method->constraints != ConstraintSupport::inequalities);
+  const bool holds_equalities = spec.asks_for_ipopt() || (method && method->gradients && !method->global &&
+                                                          method->constraints != ConstraintSupport::inequalities);
   if (!holds_equalities) return sides;
   const Stationarity found = stationarity(program, solution.x, solution.point);
   for (Eigen::Index i = 0; i < sides.size(); ++i)
@@ -170,7 +184,7 @@ LimitedSolution solve_in_rounds(DesignProgram& program, const SearchHooks& hooks
   solution = solved(program, hooks, result);
   while (solution.point.ok && !hooks.abandoned()) {
     rounds.true_values = program.evaluator().true_values(program.rho_at(solution.x));
-    if (!is_an_end(solution.status)) break;
+    if (!is_an_end(solution.status) || optimizer.is_sqp()) break;
     const TrueLimits limits_before = limits;
     if (!limits.move(program, solution.point.c, rounds.true_values, binding_sides(optimizer, program, solution))) break;
     NlpResult before = solution;

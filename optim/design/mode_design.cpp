@@ -26,27 +26,6 @@ bool may_improve(const DesignSpec& spec, const DesignResult& result) {
   return result.status == SolverStatus::converged && !(result.optimality <= kStationary * spec.optimizer.tolerance);
 }
 
-// Adds the work of an earlier search, and starts where that one did.
-void begin_with(const DesignResult& earlier, DesignResult& result) {
-  result.objective_initial = earlier.objective_initial;
-  result.iterations += earlier.iterations;
-  result.evaluations += earlier.evaluations;
-  result.failed_evaluations += earlier.failed_evaluations;
-  result.simulations += earlier.simulations;
-  result.wall_seconds += earlier.wall_seconds;
-  for (std::size_t v = 0; v < result.variables.size(); ++v) result.variables[v].initial = earlier.variables[v].initial;
-  for (std::size_t c = 0; c < result.constraints.size(); ++c)
-    result.constraints[c].initial = earlier.constraints[c].initial;
-  for (std::size_t c = 0; c < result.cases.size(); ++c) result.cases[c].initial = earlier.cases[c].initial;
-}
-
-std::vector<DesignRow> joined_histories(std::vector<DesignRow> first, std::vector<DesignRow> second) {
-  const int before = first.empty() ? 0 : first.back().iteration;
-  for (DesignRow& row : second)
-    if (row.iteration > 0) row.iteration += before, first.push_back(std::move(row));
-  return first;
-}
-
 // The problem at the values of a result, with the poses there as its guess; none if it does not close.
 std::optional<Problem> continued(const Problem& problem, const DesignResult& result) {
   Problem next = problem;
@@ -54,7 +33,7 @@ std::optional<Problem> continued(const Problem& problem, const DesignResult& res
     next.scene.parameters[p].value = result.rho(static_cast<Eigen::Index>(p));
   const Mechanism mechanism = without_derivatives(next.scene, result.rho);
   const Assembly reached(mechanism, next.scene.simulation.start_time);
-  if (!reached.result().ok) return {};
+  if (!reached.result().ok || reached.degrees_of_freedom() > 0) return {};
   set_guess(next.scene, mechanism, {reached.result().y.head(reached.result().y.size() / 2), 0});
   return next;
 }
@@ -77,9 +56,11 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
     } catch (const std::exception&) {  // a singular position, where parameters stand against each other
       break;
     }
-    const bool is_better = more.final_evaluation.ok && more.violation <= std::max(result.violation, kHeld) &&
-                           more.objective_final < result.objective_final;
-    begin_with(result, more);
+    const bool holds_more = more.violation < result.violation && result.violation > kHeld;
+    const bool is_better =
+        more.final_evaluation.ok && (holds_more || (more.violation <= std::max(result.violation, kHeld) &&
+                                                    more.objective_final < result.objective_final));
+    more.add_work_of(result);
     if (!is_better) {
       result.take_counts(more);
       result.simulations = more.simulations;
@@ -87,7 +68,7 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
       if (more.status == SolverStatus::stopped) result.end(more.status, more.message);
       break;
     }
-    more.history = joined_histories(std::move(result.history), std::move(more.history));
+    more.prepend(std::move(result.history));
     result = std::move(more);
     problem = *std::move(next);
     moved = true;
@@ -99,7 +80,7 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
 DesignResult not_begun(const Problem& problem) {
   DesignResult none;
   none.objective = problem.design->minimize;
-  none.optimizer = problem.design->optimizer.type;
+  none.optimizer = problem.design->optimizer.chosen();
   for (const std::string& name : problem.design->variables) {
     const Parameter& p = *std::ranges::find(problem.scene.parameters, name, &Parameter::name);
     none.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});
@@ -143,8 +124,9 @@ DesignResult design_in_mode(const Problem& given, const DesignOptions& options) 
   without_mode.mode.reset();
   DesignResult result = single_design(problem, without_mode);
   const bool moved = keep_mode(problem, without_mode, result);
-  result.mode = DesignMode{mode, static_cast<int>(modes.size()), {}};
-  if (posed || moved) result.mode->bodies = problem.scene.bodies;
+  std::vector<Body> bodies = result.mode ? result.mode->bodies : std::vector<Body>{};
+  if (bodies.empty() && (posed || moved)) bodies = problem.scene.bodies;
+  result.mode = DesignMode{mode, static_cast<int>(modes.size()), std::move(bodies)};
   return result;
 }
 

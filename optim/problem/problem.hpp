@@ -84,7 +84,8 @@ bool is_equality(const auto& bound) { return bound.lower && bound.upper && *boun
 
 struct OptimizerSpec {
   static constexpr const char* kLeastSquares = "least_squares";
-  std::string type = "ipopt";  // or least_squares (tracked_squares.hpp), or a method of NLopt: nlopt_solver.hpp
+  static constexpr const char* kAutomatic = "auto";
+  std::string type = kAutomatic;  // or ipopt, sqp, least_squares (tracked_squares.hpp), or a method of NLopt
   double tolerance = 1e-6;
   std::optional<long> max_iterations;   // ipopt: 100 when absent
   std::optional<long> max_evaluations;  // NLopt: depends on the method, nlopt_solver.hpp
@@ -93,6 +94,12 @@ struct OptimizerSpec {
   bool warm_start = false;              // of ipopt: the given values are near the solution
   std::optional<long> lbfgs_history;    // pairs kept, 1 to 1000; of ipopt (20 when absent), lbfgs and mlsl
   static constexpr int kIpoptIterations = 100;
+  // A field of ipopt asks for it.
+  bool asks_for_ipopt() const {
+    return type == "ipopt" || (type == kAutomatic && (hessian != "lbfgs" || warm_start || lbfgs_history));
+  }
+  bool is_sqp() const { return type == "sqp" || (type == kAutomatic && !asks_for_ipopt()); }
+  std::string chosen() const { return is_sqp() ? "sqp" : asks_for_ipopt() ? "ipopt" : type; }
 };
 
 enum class StartSampling { latin_hypercube, sobol };

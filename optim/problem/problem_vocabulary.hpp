@@ -10,7 +10,7 @@
 namespace mbsopt::inline optim {
 
 inline std::string_view optimizer_names() {
-  static const std::string names = "ipopt least_squares " + std::string(nlopt_method_names());
+  static const std::string names = "auto sqp ipopt least_squares " + std::string(nlopt_method_names());
   return names;
 }
 inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", StartSampling::latin_hypercube},
@@ -93,11 +93,13 @@ void describe(auto& v, Like<ObjectiveBound> auto& b) {
 
 void describe(auto& v, Like<OptimizerSpec> auto& o) {
   static const std::string methods =
-      "interior points (ipopt); Levenberg-Marquardt on tracked squares (least_squares); NLopt's " +
+      "chosen from the problem (auto, the default); sequential quadratic programming (sqp); interior points (ipopt); "
+      "Levenberg-Marquardt on tracked squares (least_squares); NLopt's " +
       std::string(nlopt_methods_by_kind());
   v.word("type", o.type, Words{optimizer_names()}, {methods});
   v.plain("tolerance", o.tolerance, kPositive, {"of the optimality conditions; of the last steps without gradients"});
-  v.plain("max_iterations", o.max_iterations, kNotNegative, {"at most; ipopt and least_squares: 100 when absent"});
+  v.plain("max_iterations", o.max_iterations, kNotNegative,
+          {"at most; sqp: 500 when absent, ipopt and least_squares: 100"});
   v.plain("max_evaluations", o.max_evaluations, kPositive,
           {"at most; NLopt: 500, without gradients 500 (n + 1), global 1000 (n + 1) when absent, of n variables"});
   v.word("hessian", o.hessian, Words{"lbfgs exact gauss_newton"},
@@ -148,8 +150,8 @@ void describe(auto& v, Like<DesignSpec> auto& d) {
                    inside.word("over", d.over, Words{"sum max"},
                                {"sum or maximum of its weighted values in the load cases"});
                    inside.plain("sharpness", d.sharpness, kPositive,
-                                {"of max: k in log(sum exp(k x))/k [1/unit of the objective]; when absent 100 over the "
-                                 "largest at the start"});
+                                {"of max: k in log(sum exp(k x))/k [1/unit of the objective]; when absent the true "
+                                 "maximum by sqp, else 100 over the largest at the start"});
                  });
   v.list("subject_to", d.subject_to, {"bounds on objectives; those of extremes hold for the true ones"});
   v.references("variables", d.variables, ElementKind::parameter, {"parameters that may change", Need::required});

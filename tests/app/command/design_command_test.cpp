@@ -79,7 +79,7 @@ TEST_CASE("design: the report's headline has the violation of true extremes", "[
   const CommandOutcome outcome =
       run_command({"design", folder.write("rod.json", kPendulum), "--out", folder.file("out"), "--quiet", "--set",
                    R"(design.subject_to=[{"maximum_of": "swing", "upper": -0.5, "sharpness": 5}])", "--set",
-                   "parameters.k.lower=1", "--set", "parameters.k.upper=100"});
+                   "design.optimizer.type=ipopt", "--set", "parameters.k.lower=1", "--set", "parameters.k.upper=100"});
   INFO(outcome.out << outcome.err);
   const auto optimizer = json_of(folder.path / "out/result.json").at("optimizer");
   const double smooth = optimizer.at("infeasibility"), exact = optimizer.at("true_infeasibility");

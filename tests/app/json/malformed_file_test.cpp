@@ -262,7 +262,8 @@ const Case kCases[] = {
      "has no part"},
     {"optimiser that is not there", R"("variables": ["k1"])", R"("variables": ["k1"], "optimizer": {"type": @"nlopt"})",
      "design.optimizer.type",
-     "available: ipopt, least_squares, slsqp, mma, ccsaq, lbfgs, bobyqa, cobyla, sbplx, mlsl, direct, crs, isres, "
+     "available: auto, sqp, ipopt, least_squares, slsqp, mma, ccsaq, lbfgs, bobyqa, cobyla, sbplx, mlsl, direct, crs, "
+     "isres, "
      "esch"},
     {"override of a parameter that is not there", R"("design":)",
      R"("cases": [{"name": "c", "overrides": {"k2": @1}}], "design":)", "cases[0].overrides.k2", "did you mean 'k1'"},

@@ -37,6 +37,7 @@ Problem from_start(std::size_t start, const std::string& hessian) {
   const Eigen::VectorXd lengths =
       start_values({problem.scene.parameters[0], problem.scene.parameters[1]}, spec, 7)[start];
   for (std::size_t k = 0; k < 2; ++k) problem.scene.parameters[k].value = lengths(static_cast<Eigen::Index>(k));
+  problem.design->optimizer.type = "ipopt";
   problem.design->optimizer.hessian = hessian;
   return problem;
 }
@@ -227,6 +228,7 @@ TEST_CASE("Hessians of a design are those of its scaled program", "[design_optim
   product.parameters_only = Expression::parse("L01^2*L02");
   problem.objectives.push_back(product);
   problem.design->subject_to = {{"product", {}, 10.0}};
+  problem.design->optimizer.type = "ipopt";
   DesignProgram program(problem);
   const Eigen::VectorXd x = program.x_start();
   std::vector<Eigen::MatrixXd> H;
@@ -323,6 +325,7 @@ TEST_CASE("five-bar: exact Hessians come to a tight tolerance", "[design_optimiz
   return;  // twenty times slower
 #endif
   Problem problem = still(1e-9);
+  problem.design->optimizer.type = "ipopt";
   problem.design->optimizer.tolerance = 1e-8;
   const DesignResult by_bfgs = run_design(problem);
   problem.design->optimizer.hessian = "exact";
