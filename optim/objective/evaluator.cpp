@@ -6,14 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <numbers>
 #include <numeric>
 #include <stdexcept>
 #include <unordered_map>
 #include <unordered_set>
 
 #include "core/cvodes/cvodes.hpp"
-#include "core/driven/driven_simulation.hpp"
 #include "core/expression/counted.hpp"
 #include "core/mechanism/scene_programs.hpp"
 #include "core/simulate/simulation_warnings.hpp"
@@ -24,7 +22,6 @@
 #include "optim/machine/stopwatch.hpp"
 #include "optim/objective/objective_run.hpp"
 #include "optim/objective/obstructed_parameters.hpp"
-#include "optim/objective/peaks.hpp"
 #include "optim/problem/load_cases.hpp"
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
@@ -354,88 +351,29 @@ std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd&
   return e.ok ? true_extremes(objectives_, at_rho, scene_.simulation, e.steps, options_.progress) : none;
 }
 
-namespace {
-
-// max a + max b is the largest of all a + b: the highest of these pairs.
-std::vector<ExtremePiece> pairs_of(const std::vector<ExtremePiece>& some, const std::vector<ExtremePiece>& others) {
-  const double apart = std::numbers::sqrt2;  // no two pairs of instants have the same sum then
-  std::vector<ExtremePiece> pairs;
-  for (const ExtremePiece& a : some)
-    for (const ExtremePiece& b : others)
-      pairs.push_back({a.row, a.side, a.value + b.value, a.gradient + b.gradient, a.t + apart * b.t});
-  std::ranges::stable_sort(pairs, std::greater(), &ExtremePiece::value);
-  pairs.resize(std::min(pairs.size(), 2 * kMostPeaks));
-  return pairs;
-}
-
-}  // namespace
-
 // A run for the steps, the peaks on them, and with derivatives a sweep in which each peak is a sample at its instant.
 bool Evaluator::add_extremes(Evaluation& e, Sweep sweep, bool by_cvodes) const {
-  struct Side {
-    Eigen::Index row;
-    ObjectivePart part;
-    std::shared_ptr<const PointCost> x;
-    std::vector<Peak> peaks;
-  };
   const SimulationSettings settings = by_cvodes ? with_cvodes(scene_.simulation) : scene_.simulation;
   if (options_.progress && !options_.progress(settings.start_time)) {
     e.message = "stopped before its simulation";
     return false;
   }
-  SimulationResult result;
-  std::vector<Side> sides;
-  std::vector<Objective> others;
-  std::vector<Eigen::Index> rows;  // of the others
-  for (std::size_t i = 0; i < objectives_.size(); ++i)
-    if (!objectives_[i].is_extreme()) {
-      others.push_back(objectives_[i]);
-      rows.push_back(static_cast<Eigen::Index>(i));
-    }
-  const RunOptions options{.progress = options_.progress, .exact_stages = options_.exact_stages};
+  ExtremeRun run(objectives_, settings, {.progress = options_.progress, .exact_stages = options_.exact_stages});
   try {
-    const Mechanism at_rho = mechanism(e.rho, false);
-    std::vector<Cost> shapes;  // of the extremes, which panels of a solved run resolve
-    std::vector<Watched> watched;
-    for (std::size_t i = 0; i < objectives_.size(); ++i) {
-      if (!objectives_[i].is_extreme()) continue;
-      const std::shared_ptr<const PointCost> x = objectives_[i].expression(at_rho);
-      if (!x) continue;
-      for (const ObjectivePart& part : objectives_[i].parts()) {
-        sides.push_back({static_cast<Eigen::Index>(i), part, x, {}});
-        watched.push_back({part.side, x});
-      }
-      Cost& shape = shapes.emplace_back();
-      shape.name = objectives_[i].name();
-      shape.running = x;
-    }
-    const bool may_be_solved = mbsopt::may_be_solved(at_rho, settings);
-    const auto simulated = [&](std::span<const Cost> costs) {
-      ++e.simulations;
-      std::vector<Cost> all(costs.begin(), costs.end());
-      if (may_be_solved) all.insert(all.end(), shapes.begin(), shapes.end());
-      SimulationResult r = simulate(at_rho, settings, all, {}, options);
-      if (r.ok()) r.psi.conservativeResize(static_cast<Eigen::Index>(costs.size()));
-      return r;
-    };
-    result = run_objectives(others, at_rho, settings, simulated, options_.progress);
-    e.statistics = result.statistics;
-    e.steps = result.steps;
-    e.y_initial = result.y_initial;
-    e.message = result.message;
-    e.warnings = simulation_warnings(scene_, settings, result.statistics, result.ok());
-    if (!result.ok()) return false;
-    for (std::size_t k = 0; k < rows.size(); ++k) e.psi(rows[k]) = result.psi(static_cast<Eigen::Index>(k));
-    std::vector<std::vector<Peak>> found = peaks(watched, at_rho, settings, e.steps, options_.progress);
-    if (found.size() < sides.size()) {
-      e.message = "the run that looks for extremes failed";
-      return false;
-    }
-    for (std::size_t k = 0; k < sides.size(); ++k) {
-      sides[k].peaks = std::move(found[k]);
-      e.psi(sides[k].row) += sides[k].part.factor * sides[k].peaks.front().value;
-    }
-    if (sweep == Sweep::none) return true;
+    bool ok = run.find(mechanism(e.rho, false));
+    if (ok && sweep != Sweep::none)
+      ok = run.differentiate(mechanism(e.rho, true), sweep == Sweep::backward, variables_);
+    e.statistics = run.result().statistics;
+    e.steps = run.result().steps;
+    e.y_initial = run.result().y_initial;
+    e.message = run.result().message;
+    e.simulations += run.simulations();
+    e.warnings = simulation_warnings(scene_, settings, e.statistics, ok);
+    if (!ok) return false;
+    e.psi = run.result().psi;
+    if (sweep != Sweep::none) e.psi_rho = run.result().psi_rho;
+    e.pieces = run.pieces();
+    return true;
   } catch (const SceneError& error) {
     e.message = error.what();
     return false;
@@ -443,63 +381,6 @@ bool Evaluator::add_extremes(Evaluation& e, Sweep sweep, bool by_cvodes) const {
     e.message = error.what();
     return false;
   }
-  const Mechanism at_rho = mechanism(e.rho, true);
-  RunOptions on_steps = options;
-  if (!by_cvodes && !is_cvodes(settings.integrator.type)) on_steps.frozen = &e.steps;
-  Eigen::MatrixXd of_peaks;  // value and derivatives of each peak
-  Eigen::VectorXd values;
-  const auto swept = [&](std::span<const Cost> costs) {
-    ++e.simulations;
-    std::vector<Cost> all(costs.begin(), costs.end());
-    for (const Side& side : sides) {
-      const std::shared_ptr<const PointCost> x = objectives_[static_cast<std::size_t>(side.row)].expression(at_rho);
-      for (const Peak& peak : side.peaks)
-        for (const double t : {peak.t, peak.top}) {
-          Cost& cost = all.emplace_back();
-          cost.name = objectives_[static_cast<std::size_t>(side.row)].name();
-          cost.samples.push_back({t, x});
-        }
-    }
-    SimulationResult r = sweep == Sweep::forward ? simulate_tlm(at_rho, settings, all, {}, on_steps)
-                                                 : simulate_adjoint(at_rho, settings, all, on_steps);
-    if (!r.ok()) return r;
-    const Eigen::Index n = static_cast<Eigen::Index>(costs.size()), m = static_cast<Eigen::Index>(all.size()) - n;
-    values = r.psi.tail(m);
-    of_peaks = r.psi_rho.bottomRows(m)(Eigen::all, variables_);
-    r.psi = Eigen::VectorXd(r.psi.head(n));
-    r.psi_rho = Eigen::MatrixXd(r.psi_rho.topRows(n));
-    return r;
-  };
-  result = run_objectives(others, at_rho, settings, swept, options_.progress);
-  e.message = result.message;
-  if (!result.ok()) return false;
-  e.statistics.jumps = result.statistics.jumps;
-  e.statistics.gradient_quadrature = result.statistics.gradient_quadrature;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    e.psi(rows[k]) = result.psi(static_cast<Eigen::Index>(k));
-    if (result.psi_rho.rows() > 0)  // of one that is simulated
-      e.psi_rho.row(rows[k]) = result.psi_rho.row(static_cast<Eigen::Index>(k))(variables_);
-  }
-  Eigen::Index j = 0;
-  std::vector<ExtremePiece> of_row;
-  for (std::size_t k = 0; k < sides.size(); ++k) {
-    const Side& side = sides[k];
-    std::vector<ExtremePiece> pieces;
-    for (const Peak& peak : side.peaks) {  // the top is higher but for kinks
-      const Eigen::Index best = side.part.side * values(j) >= side.part.side * values(j + 1) ? j : j + 1;
-      pieces.push_back({side.row, static_cast<int>(side.part.side * side.part.factor), side.part.factor * values(best),
-                        side.part.factor * of_peaks.row(best).transpose(), peak.t});
-      j += 2;
-    }
-    if (k > 0 && sides[k - 1].row == side.row) pieces = pairs_of(std::exchange(of_row, {}), pieces);
-    of_row = std::move(pieces);
-    if (k + 1 < sides.size() && sides[k + 1].row == side.row) continue;
-    std::ranges::stable_sort(of_row, std::greater(), [](const ExtremePiece& p) { return p.side * p.value; });
-    e.psi(side.row) = of_row.front().value;
-    e.psi_rho.row(side.row) = of_row.front().gradient.transpose();
-    std::ranges::move(of_row, std::back_inserter(e.pieces));
-  }
-  return true;
 }
 
 bool Evaluator::add_parameters_only(Evaluation& e) const {

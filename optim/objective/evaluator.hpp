@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "core/simulate/simulation.hpp"
+#include "optim/objective/extreme_run.hpp"
 #include "optim/objective/objective.hpp"
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/problem.hpp"
@@ -50,16 +51,6 @@ struct GradientCost {
   double tlm = 0, adjoint = 0;
 };
 GradientCost gradient_cost(std::size_t variables, std::size_t objectives);
-
-// One of the functions of which an objective is the largest or least: a peak of its expression, or of a peak to peak
-// value two of them.
-struct ExtremePiece {
-  Eigen::Index row = 0;  // of psi
-  int side = 1;          // -1: of the least
-  double value = 0;
-  Eigen::VectorXd gradient;  // per variable; the instant does not move it, as it is stationary
-  double t = 0;              // [s]; of two, a sum that tells pairs apart
-};
 
 // In load cases: psi and its derivatives case by case, each with all objectives. ok holds if all cases are ok.
 // Statistics are those of the first.

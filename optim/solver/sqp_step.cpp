@@ -32,12 +32,133 @@ double sum_of_worst(const std::vector<SqpRow>& rows, const std::vector<double>& 
   return sum;
 }
 
-std::vector<Index> others_than(Index k, Index count) {
-  std::vector<Index> others;
-  for (Index i = 0; i < count; ++i)
-    if (i != k) others.push_back(i);
-  return others;
-}
+// The dual problem of a step, over the rows that have joined.
+class Dual {
+ public:
+  Dual(const SqpModel& model, const MatrixXd& L, double nu)
+      : model_(model),
+        L_(L),
+        nu_(nu),
+        n_(model.g.size()),
+        m_(static_cast<Index>(model.rows.size())),
+        r_(L.triangularView<Eigen::Lower>().solve(model.g)),
+        is_taken_(static_cast<std::size_t>(m_ + 2 * n_), false) {
+    for (const SqpRow& row : model.rows)
+      if (row.row < 0) extremes_.emplace(row.row, static_cast<Index>(extremes_.size()));
+  }
+
+  SqpStep solve() {
+    for (Index j = 0; j < m_; ++j)
+      if (const SqpRow& row = row_at(j); row.row < 0 || row.u <= 0 || row.is_equality) take(j);
+    const Index most_turns = m_ + 2 * n_ + 1;
+    SqpStep step;
+    for (Index turn = 0; turn < most_turns; ++turn) {
+      solve_taken();
+      step.d = primal();
+      if (turn < most_turns / 2) leave();
+      if (!take_broken(step.d)) break;
+    }
+    step.y.setZero(m_);
+    for (std::size_t c = 0; c < taken_.size(); ++c)
+      if (taken_[c] < m_) step.y(taken_[c]) = y_[c];
+    step.d = step.d.cwiseMax(model_.lower).cwiseMin(model_.upper);
+    step.ok = step.d.allFinite();
+    return step;
+  }
+
+ private:
+  // Column j is row j of the model; beyond them the lower bounds of the variables, then the upper ones.
+  struct Column {
+    VectorXd a;
+    double u, least, most;
+  };
+  Column column(Index j) const {
+    if (j < m_) {
+      const SqpRow& row = row_at(j);
+      return {row.a, row.u, row.is_equality ? -nu_ : 0, row.row < 0 ? kInfinity : nu_};
+    }
+    const Index k = (j - m_) % n_;
+    const bool is_upper = j - m_ >= n_;
+    return {(is_upper ? 1 : -1) * VectorXd::Unit(n_, k), is_upper ? model_.upper(k) : -model_.lower(k), 0, kInfinity};
+  }
+
+  void solve_taken() {
+    constexpr double kGivesWay = 1e-10;            // delta: scaled multipliers are about 1, limits hold to 1e-8
+    constexpr double kCurvatureOfExtremes = 1e-3;  // tau: the multipliers of pieces sum up to 1 - tau t
+    const double root = std::sqrt(kGivesWay / std::max(1.0, nu_)), weight = 1 / std::sqrt(kCurvatureOfExtremes);
+    const Index columns = static_cast<Index>(taken_.size()), extremes = static_cast<Index>(extremes_.size());
+    y_.assign(taken_.size(), 0);
+    LA_.resize(n_, columns);
+    if (columns == 0) return;
+    MatrixXd M = MatrixXd::Zero(n_ + extremes + columns, columns);
+    VectorXd b = VectorXd::Zero(M.rows()), least(columns), most(columns);
+    b.head(n_) = -r_;
+    b.segment(n_, extremes).setConstant(weight);
+    for (Index c = 0; c < columns; ++c) {
+      const Index j = taken_[static_cast<std::size_t>(c)];
+      const Column of = column(j);
+      least(c) = of.least;
+      most(c) = of.most;
+      LA_.col(c) = L_.triangularView<Eigen::Lower>().solve(of.a);
+      M.col(c).head(n_) = LA_.col(c);
+      if (j < m_ && row_at(j).row < 0) M(n_ + extremes_.at(row_at(j).row), c) = weight;
+      M(n_ + extremes + c, c) = root;
+      b(n_ + extremes + c) = -of.u / root;
+    }
+    const VectorXd y = bounded_linear_least_squares(M, b, least, most);
+    y_.assign(y.begin(), y.end());
+  }
+
+  // d = -H^-1 (g + A'y)
+  VectorXd primal() const {
+    VectorXd sum = r_;
+    for (std::size_t c = 0; c < y_.size(); ++c) sum += y_[c] * LA_.col(static_cast<Index>(c));
+    return -L_.triangularView<Eigen::Lower>().transpose().solve(sum);
+  }
+
+  bool take(Index j) {
+    if (is_taken_[static_cast<std::size_t>(j)]) return false;
+    is_taken_[static_cast<std::size_t>(j)] = true;
+    taken_.push_back(j);
+    return true;
+  }
+
+  // Rows that nothing pushes leave again: their distances would only add to the rounding.
+  void leave() {
+    for (std::size_t c = taken_.size(); c-- > 0;) {
+      if (y_[c] != 0 || (taken_[c] < m_ && row_at(taken_[c]).row < 0)) continue;
+      is_taken_[static_cast<std::size_t>(taken_[c])] = false;
+      taken_.erase(taken_.begin() + static_cast<std::ptrdiff_t>(c));
+      y_.erase(y_.begin() + static_cast<std::ptrdiff_t>(c));
+    }
+  }
+
+  // Returns whether a row joined.
+  bool take_broken(const VectorXd& d) {
+    constexpr double kBroken = 1e-12;  // by more than rounding
+    bool joined = false;
+    for (Index j = 0; j < m_; ++j)
+      if (row_at(j).row >= 0 && row_at(j).a.dot(d) - row_at(j).u > kBroken) joined = take(j) || joined;
+    for (Index k = 0; k < n_; ++k) {
+      if (d(k) < model_.lower(k)) joined = take(m_ + k) || joined;
+      if (d(k) > model_.upper(k)) joined = take(m_ + n_ + k) || joined;
+    }
+    return joined;
+  }
+
+  const SqpRow& row_at(Index j) const { return model_.rows[static_cast<std::size_t>(j)]; }
+
+  const SqpModel& model_;
+  const MatrixXd& L_;  // H = L L'
+  const double nu_;
+  const Index n_, m_;
+  const VectorXd r_;                 // L^-1 g
+  std::map<Index, Index> extremes_;  // in f: their numbers by NlpPiece::row
+  std::vector<bool> is_taken_;
+  std::vector<Index> taken_;
+  std::vector<double> y_;  // of the columns taken
+  MatrixXd LA_;            // L^-1 a of each
+};
 
 }  // namespace
 
@@ -57,7 +178,6 @@ SqpModel::SqpModel(const NonlinearProgram& problem, const VectorXd& x, const Nlp
       const auto [top, is_first] = largest.emplace(piece.row, piece.value);
       if (is_first) g -= problem.f_scale * piece.gradient;  // the first of each is the largest
     }
-  extremes = static_cast<Index>(largest.size());
   for (std::size_t k = 0; k < point.pieces.size(); ++k) {
     const NlpPiece& piece = point.pieces[k];
     if (piece.row < 0) {
@@ -121,90 +241,9 @@ void SqpModel::correct(const NonlinearProgram& problem, const VectorXd& d, const
 }
 
 SqpStep SqpModel::step(const MatrixXd& H, double nu) const {
-  constexpr double kGivesWay = 1e-10;            // delta: scaled multipliers are about 1, limits hold to 1e-8
-  constexpr double kCurvatureOfExtremes = 1e-3;  // tau: the multipliers of pieces sum up to 1 - tau t
-  constexpr double kBroken = 1e-12;              // by more than rounding
-  const Index n = g.size();
-  SqpStep step;
-  step.y.setZero(static_cast<Index>(rows.size()));
   const MatrixXd L = cholesky_factor(H);
-  if (L.size() == 0) return step;
-  const auto triangle = L.triangularView<Eigen::Lower>();
-  const VectorXd r = triangle.solve(g);
-  // Column j of the dual problem is row j; beyond them the lower bounds of the variables, then the upper ones.
-  const Index m = static_cast<Index>(rows.size());
-  std::vector<Index> taken;
-  std::vector<bool> is_taken(static_cast<std::size_t>(m + 2 * n), false);
-  const auto take = [&](Index j) {
-    if (is_taken[static_cast<std::size_t>(j)]) return false;
-    is_taken[static_cast<std::size_t>(j)] = true;
-    taken.push_back(j);
-    return true;
-  };
-  const double root = std::sqrt(kGivesWay / std::max(1.0, nu)), weight = 1 / std::sqrt(kCurvatureOfExtremes);
-  for (Index j = 0; j < m; ++j)
-    if (const SqpRow& row = rows[static_cast<std::size_t>(j)]; row.row < 0 || row.u <= 0 || row.is_equality) take(j);
-  VectorXd y;
-  step.d = -triangle.transpose().solve(r);
-  const Index most_turns = m + 2 * n + 1;
-  for (Index turn = 0; turn < most_turns; ++turn) {
-    if (!taken.empty()) {
-      const Index columns = static_cast<Index>(taken.size());
-      MatrixXd M = MatrixXd::Zero(n + extremes + columns, columns);
-      VectorXd b = VectorXd::Zero(M.rows()), least = VectorXd::Zero(columns), most = VectorXd::Constant(columns, nu);
-      b.head(n) = -r;
-      b.segment(n, extremes).setConstant(weight);
-      for (Index c = 0; c < columns; ++c) {
-        const Index j = taken[static_cast<std::size_t>(c)];
-        VectorXd a = VectorXd::Zero(n);
-        double u = 0;
-        if (j < m) {
-          const SqpRow& row = rows[static_cast<std::size_t>(j)];
-          a = row.a;
-          u = row.u;
-          if (row.row < 0) {
-            M(n - 1 - row.row, c) = weight;
-            most(c) = kInfinity;
-          }
-          if (row.is_equality) least(c) = -nu;
-        } else {
-          const Index k = (j - m) % n;
-          const bool is_upper = j - m >= n;
-          a(k) = is_upper ? 1 : -1;
-          u = is_upper ? upper(k) : -lower(k);
-          most(c) = kInfinity;
-        }
-        M.col(c).head(n) = triangle.solve(a);
-        M(n + extremes + c, c) = root;
-        b(n + extremes + c) = -u / root;
-      }
-      y = bounded_linear_least_squares(M, b, least, most);
-      step.d = -triangle.transpose().solve(VectorXd(r + M.topRows(n) * y));
-    }
-    // Rows that nothing pushes leave again: their distances would only add to the rounding.
-    bool joined = false;
-    for (std::size_t c = taken.size(); c-- > 0 && turn < most_turns / 2;) {
-      if (y(static_cast<Index>(c)) != 0 || (taken[c] < m && rows[static_cast<std::size_t>(taken[c])].row < 0)) continue;
-      is_taken[static_cast<std::size_t>(taken[c])] = false;
-      taken.erase(taken.begin() + static_cast<std::ptrdiff_t>(c));
-      y = VectorXd(y)(others_than(static_cast<Index>(c), y.size()));
-    }
-    for (Index j = 0; j < m; ++j) {
-      const SqpRow& row = rows[static_cast<std::size_t>(j)];
-      if (row.row < 0) continue;  // all are taken
-      if (row.a.dot(step.d) - row.u > kBroken) joined = take(j) || joined;
-    }
-    for (Index k = 0; k < n; ++k) {
-      if (step.d(k) < lower(k)) joined = take(m + k) || joined;
-      if (step.d(k) > upper(k)) joined = take(m + n + k) || joined;
-    }
-    if (!joined) break;
-  }
-  for (std::size_t c = 0; c < taken.size(); ++c)
-    if (taken[c] < m) step.y(taken[c]) = y(static_cast<Index>(c));
-  step.d = step.d.cwiseMax(lower).cwiseMin(upper);
-  step.ok = step.d.allFinite();
-  return step;
+  if (L.size() == 0) return {};
+  return Dual(*this, L, nu).solve();
 }
 
 }  // namespace mbsopt::inline optim

@@ -47,7 +47,6 @@ struct SqpModel {
 
   Eigen::VectorXd g;  // of f without its extremes
   std::vector<SqpRow> rows;
-  Eigen::Index extremes = 0;     // in f
   Eigen::VectorXd lower, upper;  // of d
 };
 
