@@ -70,7 +70,7 @@ void add_to_result(Json& result, const DesignResult& design) {
   if (design.seed) optimizer["seed"] = *design.seed;
   if (design.status == SolverStatus::converged)
     optimizer["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
-  if (design.mode) optimizer["assembly_mode"] = mode_json(*design.mode);
+  if (design.mode && design.mode->of > 0) optimizer["assembly_mode"] = mode_json(*design.mode);
   if (design.closing_steps > 0) optimizer["closing_steps"] = design.closing_steps;
   if (design.limit_rounds > 0) optimizer["limit_rounds"] = design.limit_rounds;
   for (const DesignConflict& c : design.conflicts)

@@ -52,7 +52,7 @@ struct DesignConflict {
 
 // In which assembly mode a mechanism is designed (core/start/assembly_modes.hpp).
 struct DesignMode {
-  int mode = 0, of = 1;        // 0: that of the scene's poses at the start; and how many there are
+  int mode = 0, of = 1;        // 0: that of the scene's poses at the start; and how many there are, 0: not counted
   std::vector<Body> bodies{};  // of the scene, their poses those of the mode; empty: the scene's own
 };
 

@@ -128,7 +128,7 @@ class SingleDesign {
     for (const Body& followed : program_.evaluator().of_case(0).scene().bodies)
       for (Body& body : bodies)
         if (body.name == followed.name) body = followed;
-    result_.mode = DesignMode{0, 1, std::move(bodies)};
+    result_.mode = DesignMode{0, 0, std::move(bodies)};
   }
 
   // The end point of a stopped search is evaluated as well; nothing abandons that.
