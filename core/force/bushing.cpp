@@ -78,10 +78,16 @@ double value_of(const Dual& x) { return x.value(); }
 double chained(double value, double, double) { return value; }
 Dual chained(double value, double slope, const Dual& c) { return {value, slope * c.derivatives()}; }
 
-// All calls are inlined: dual numbers that functions return are slow.
+// All calls are inlined: dual numbers that functions return are slow. With the checks of a sanitizer in each of them
+// g++ would take half an hour.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define MBSOPT_FLATTEN
+#else
+#define MBSOPT_FLATTEN [[gnu::flatten]]
+#endif
 template <class T>
-[[gnu::flatten]] void loads(const FrameOf<T>& f1, const FrameOf<T>& f2, const FieldsOf<T>& x,
-                            Eigen::Matrix<T, 6, 1>& load1, Eigen::Matrix<T, 6, 1>& load2) {
+MBSOPT_FLATTEN void loads(const FrameOf<T>& f1, const FrameOf<T>& f2, const FieldsOf<T>& x,
+                          Eigen::Matrix<T, 6, 1>& load1, Eigen::Matrix<T, 6, 1>& load2) {
   using V = Eigen::Matrix<T, 3, 1>;
   using M3 = Eigen::Matrix<T, 3, 3>;
   const M3 A1t = f1.A.transpose(), A2t = f2.A.transpose(), A1dot_t = f1.Adot.transpose(), R0t = x.R0.transpose();
