@@ -90,10 +90,12 @@ class SqpSearch : private NlpSearch {
       result_.end_on_request();
       return true;
     }
-    if (distance > tolerance_ || !is_settled()) return was_optimal_ = false;
-    // One step more takes what a small multiplier leaves of its limit.
-    const bool has_limits = problem_.constraints() > 0 || !point_.pieces.empty();
-    if (has_limits && result_.iterations > 0 && !std::exchange(was_optimal_, true)) return false;
+    if (!was_optimal_) {
+      if (distance > tolerance_ || !is_settled()) return false;
+      // One step more takes what a small multiplier leaves of its limit.
+      was_optimal_ = result_.iterations > 0 && (problem_.constraints() > 0 || !point_.pieces.empty());
+      if (was_optimal_) return false;
+    }
     conclude({});
     return true;
   }
