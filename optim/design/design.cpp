@@ -48,7 +48,7 @@ std::optional<double> design_sharpness(const Problem& problem, const DesignOptio
 NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
   DesignProgram program(problem, options);
   program.start_from(program.x_start());
-  return {program.f_scale, program.c_scale};
+  return program.scale();
 }
 
 int design_modes(const Problem& problem, const DesignOptions& options) {

@@ -25,7 +25,7 @@ using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Of the size of a limit on a true extreme: another look at the run may find one that is larger by rounding.
+// A limit on a true extreme is moved inside by this part of its size: another look at the run may find a larger one.
 constexpr double kInsideExtremes = 5e-7;
 
 double inverse(double x) { return x > 0 && std::isfinite(x) ? 1 / x : 1; }
@@ -222,9 +222,9 @@ NlpScale DesignProgram::scale_at(const VectorXd& x_start) {
 }
 
 Evaluation DesignProgram::start_from(const VectorXd& x_start, const std::optional<NlpScale>& given) {
-  const NlpScale scale = given ? *given : scale_at(x_start);
-  f_scale = scale.f;
-  c_scale = scale.c;
+  scale_ = given ? *given : scale_at(x_start);
+  f_scale = scale_.f;
+  c_scale = scale_.c;
   for (Index i = 0; i < constraints(); ++i) {
     if (bound(i).lower.value_or(0) != 0 || bound(i).upper.value_or(0) != 0) continue;
     size_(i) = 1 / c_scale(i);  // bounds of 0 have no size; this is what variables of size 1 alter

@@ -33,6 +33,7 @@ class DesignProgram : public NonlinearProgram {
   // those at the start and a little way from it. So a start at the optimum, where both may vanish, is recognised.
   // Constraints likewise. Or by a given scale.
   Evaluation start_from(const Eigen::VectorXd& x_start, const std::optional<NlpScale>& scale = {});
+  const NlpScale& scale() const { return scale_; }  // as given or found by start_from()
 
   void evaluate(const Eigen::VectorXd& x, NlpPoint& point) override;
   void evaluate_values(const Eigen::VectorXd& x, NlpPoint& point) override;
@@ -85,6 +86,7 @@ class DesignProgram : public NonlinearProgram {
   CaseObjective objective_;
   const Eigen::Index bounds_;  // of each case
   const std::function<bool()> abandoned_;
+  NlpScale scale_;
   Eigen::VectorXd size_;  // of each constraint's bounds
   Evaluation best_;
   double best_f_ = 0, best_violations_ = 0;

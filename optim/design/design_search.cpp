@@ -99,7 +99,7 @@ class SingleDesign {
   void begin() {
     result_.optimizer = program_.spec().optimizer.chosen();
     start_ = program_.start_from(program_.x_start(), options_.scale);
-    result_.scale = {program_.f_scale, program_.c_scale};
+    result_.scale = program_.scale();
     result_.gradient_choice = start_.choice.empty() ? std::string(to_string(start_.method)) : start_.choice;
     describe_start(program_, start_, result_);
     if (!start_.ok || !options_.compare_differences) return;
@@ -167,7 +167,7 @@ class SingleDesign {
 
 namespace {
 
-// What an optimiser may still spend; nothing if that is nothing.
+// Leaves the next optimiser what the first one has not spent. Returns false if that is nothing.
 bool take_off(const DesignResult& spent, OptimizerSpec& spec) {
   if (spec.max_iterations) *spec.max_iterations -= spent.iterations;
   if (spec.max_evaluations) *spec.max_evaluations -= spent.evaluations;

@@ -33,7 +33,7 @@ std::optional<Problem> continued(const Problem& problem, const DesignResult& res
     next.scene.parameters[p].value = result.rho(static_cast<Eigen::Index>(p));
   const Mechanism mechanism = without_derivatives(next.scene, result.rho);
   const Assembly reached(mechanism, next.scene.simulation.start_time);
-  if (!reached.result().ok || reached.degrees_of_freedom() > 0) return {};
+  if (!reached.result().ok) return {};
   set_guess(next.scene, mechanism, {reached.result().y.head(reached.result().y.size() / 2), 0});
   return next;
 }
@@ -56,10 +56,8 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
     } catch (const std::exception&) {  // a singular position, where parameters stand against each other
       break;
     }
-    const bool holds_more = more.violation < result.violation && result.violation > kHeld;
-    const bool is_better =
-        more.final_evaluation.ok && (holds_more || (more.violation <= std::max(result.violation, kHeld) &&
-                                                    more.objective_final < result.objective_final));
+    const bool is_better = more.final_evaluation.ok && more.violation <= std::max(result.violation, kHeld) &&
+                           more.objective_final < result.objective_final;
     more.add_work_of(result);
     if (!is_better) {
       result.take_counts(more);

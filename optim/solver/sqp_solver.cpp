@@ -144,7 +144,8 @@ class SqpSearch : private NlpSearch {
   SqpStep damped_step(const SqpModel& model) {
     constexpr double kRounding = 1e-14, kFar = 1e5, kInside = 0.75, kFactor = 4;
     constexpr int kTurns = 60;
-    // What limits do not balance moves x by kFar radii at most: limits bring it back by differences of such lengths.
+    // The part of the gradient that limits do not balance may move x by kFar radii at most: limits bring it back by
+    // differences of such lengths.
     const double least = std::max(
         {kRounding * B().diagonal().maxCoeff(), unbalanced_ / (kFar * radius_), std::numeric_limits<double>::min()});
     SqpStep step = damped_by(model, least);
@@ -197,7 +198,7 @@ class SqpSearch : private NlpSearch {
   // One accepted step. Returns false if there is none.
   bool advance() {
     const SqpModel model(problem_, x_, point_);
-    unbalanced_ = optimality(problem_, x_, point_);
+    unbalanced_ = std::isfinite(distance_) ? distance_ : optimality(problem_, x_, point_);
     missed_ = std::numeric_limits<double>::infinity();
     while (true) {
       SqpStep step = steered_step(model);
@@ -317,7 +318,7 @@ class SqpSearch : private NlpSearch {
     return change;
   }
 
-  // Of the function that this row was of.
+  // Returns the gradient at another point of the function that this row was of.
   VectorXd gradient_of(const SqpRow& row, const NlpPoint& there) const {
     const NlpPiece* nearest = nullptr;
     if (row.piece >= 0) {
