@@ -111,10 +111,14 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
   group_rows(model.data);
   scale_alpha(model.data);
   model.data.theta_rho = model.fields.theta_rho();
+  const auto find_plane = [&] {
+    PlanarSearch plane = find_planar_model(scene, model.data);
+    model.data.planar = std::move(plane.model);
+    model.data.not_planar = std::move(plane.reason);
+  };
+  find_plane();
   close_rounded_loops(model.data, scene.simulation.redundancy_tolerance);
-  PlanarSearch plane = find_planar_model(scene, model.data);
-  model.data.planar = std::move(plane.model);
-  model.data.not_planar = std::move(plane.reason);
+  if (model.data.rounded.made) find_plane();
   return std::move(model.data);
 }
 

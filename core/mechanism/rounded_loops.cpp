@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -12,6 +13,7 @@
 #include "core/linear/dense.hpp"
 #include "core/linear/row_dependence.hpp"
 #include "core/mechanism/joint_graph.hpp"
+#include "core/mechanism/planar_model.hpp"
 
 namespace mbsopt {
 namespace {
@@ -31,26 +33,39 @@ class Loops {
  public:
   enum class Outcome { exact, moved, none };
 
-  Loops(const MechanismData& data, double threshold)
-      : d_(data), threshold_(threshold), lengths_(joint_lengths(data)), constant_(VectorXd::Zero(data.m)) {
+  // With a plane, only motion and equations within it are looked at.
+  Loops(const MechanismData& data, double threshold, const PlanarModel* plane = nullptr)
+      : d_(data),
+        threshold_(threshold),
+        plane_(plane),
+        width_(plane ? 3 : 6),
+        lengths_(joint_lengths(data)),
+        constant_(VectorXd::Zero(data.m)) {
     std::vector<int> terms(at(d_.m), 0);
     for (const Constraint& c : d_.constraints) ++terms[at(c.row)];
     for (const Constraint& c : d_.constraints) {
       if (c.drive >= 0 || terms[at(c.row)] > 1 || std::holds_alternative<Angle>(c.primitive)) continue;
       given_.push_back(c);
-      rows_ += c.rows();
+      for (int i = 0; i < c.rows(); ++i)
+        rows_ += !plane_ || std::ranges::binary_search(plane_->rows, c.row + i) ? 1 : 0;
     }
     for (const RowLaw& law : d_.laws) constant_(law.row) = law.law.constant;
     set(VectorXd::Zero(12 * static_cast<Index>(d_.joint_names.size())));
     direction_ = VectorXd::Zero(6 * d_.n);
   }
 
+  // Returns whether no equation is redundant where the joints are closed.
+  bool are_independent() {
+    Position p = guess();
+    double largest = INFINITY;
+    const std::vector<SparseEntry> J = d_.n < kManyBodies ? std::vector<SparseEntry>() : entries(p, largest);
+    return largest <= exact(p) ? rank(J, threshold_) == rows_ : close(p) && p.L.cols() == 0;
+  }
+
   // Finds the correction x of the numbers that closes the loops, unless they have all digits.
   Outcome search() {
     constexpr int kBatches = 8, kBatch = 6;
-    std::vector<Position> all(1);
-    all[0].q.resize(7 * d_.n);
-    for (int i = 1; i <= d_.n; ++i) all[0].q.segment<7>(7 * (i - 1)) = d_.bodies[at(i)].q;
+    std::vector<Position> all{guess()};
     if (agrees_at_sight(all[0])) return Outcome::exact;
     if (!close(all[0])) return Outcome::none;
     if (all[0].L.cols() == 0 || agrees(all[0])) return Outcome::exact;
@@ -107,6 +122,18 @@ class Loops {
     double gap = 0;                  // |L'Phi|, |L'J|
   };
 
+  static constexpr int kManyBodies = 12;  // dense decompositions of fewer take less than a step
+
+  Position guess() const {
+    Position p;
+    p.q.resize(7 * d_.n);
+    for (int i = 1; i <= d_.n; ++i) {
+      p.q.segment<7>(7 * (i - 1)) = d_.bodies[at(i)].q;
+      if (plane_) p.q.segment<4>(7 * (i - 1) + 3) = plane_->bodies[at(i)].p_a;
+    }
+    return p;
+  }
+
   bool is_regular(const Position& p) const { return p.L.cols() == redundant_; }
   bool agrees(const Position& p) const { return p.gap <= exact(p); }
   double exact(const Position& p) const {  // coordinates far from the origin have coarser digits
@@ -114,17 +141,30 @@ class Loops {
   }
 
   // Decides for many bodies, in linear time, whether the guess shows no rounding.
-  bool agrees_at_sight(Position& guess) const {
-    constexpr int kManyBodies = 12;  // dense decompositions of fewer take less than a step
+  bool agrees_at_sight(const Position& guess) const {
     if (d_.n < kManyBodies) return false;
-    evaluate(guess);
+    double largest = 0;
+    const std::vector<SparseEntry> J = entries(guess, largest);
+    const int seen = rank(J, threshold_);
+    return seen == rows_ || (largest <= exact(guess) && rank(J, kExact) == seen);
+  }
+  std::vector<SparseEntry> entries(const Position& p, double& largest) const {  // of J; the largest |Phi|
     std::vector<SparseEntry> J;
-    for (int i = 0; i < rows_; ++i)
-      for (int k = 0; k < guess.J.cols(); ++k)
-        if (guess.J(i, k) != 0) J.push_back({i, k, guess.J(i, k)});
-    const auto rank = [&](double threshold) { return row_dependence(rows_, d_.n, 6, J, threshold).rank; };
-    const int seen = rank(threshold_);
-    return seen == rows_ || (guess.Phi.lpNorm<Eigen::Infinity>() <= exact(guess) && rank(kExact) == seen);
+    largest = 0;
+    for_each_equation(p.q, [&](Index row, const Constraint& c, double phi, const std::array<Vec<6>, 2>& gradient) {
+      largest = std::max(largest, std::abs(phi));
+      for (const int side : {0, 1}) {
+        const int body = side == 0 ? c.body1 : c.body2;
+        if (body == 0) continue;
+        const OfBody columns = in_columns(body, gradient[at(side)]);
+        for (int k = 0; k < width_; ++k)
+          if (columns(k) != 0) J.push_back({static_cast<int>(row), width_ * (body - 1) + k, columns(k)});
+      }
+    });
+    return J;
+  }
+  int rank(const std::vector<SparseEntry>& J, double threshold) const {
+    return row_dependence(rows_, d_.n, width_, J, threshold).rank;
   }
 
   // Calls f(joint, length of the body for a point or 0 for a direction, x of its joint's side, vector).
@@ -159,14 +199,12 @@ class Loops {
     });
   }
 
-  // A joint's equation sees x as a displacement of its body alone, so that Phi_x consists of the same blocks as J.
-  void evaluate(Position& p) const {
-    std::vector<Frame> f(at(d_.n) + 1);
+  // Calls f(row, constraint, value, its gradient in the displacements of both bodies) for the equations.
+  template <class F>
+  void for_each_equation(const VectorXd& q, F&& f) const {
+    std::vector<Frame> frames(at(d_.n) + 1);
     BodyState state;
-    for (int i = 1; i <= d_.n; ++i) set_position(p.q.segment<7>(7 * (i - 1)), state, f[at(i)]);
-    p.Phi.setZero(rows_);
-    p.J.setZero(rows_, 6 * d_.n);
-    p.Phi_x.setZero(rows_, x_.size());
+    for (int i = 1; i <= d_.n; ++i) set_position(q.segment<7>(7 * (i - 1)), state, frames[at(i)]);
     Index row = 0;
     for (const Constraint& c : moved_) {
       const double unit = c.quantity() == RowQuantity::length ? 1 / lengths_.whole : 1;
@@ -174,22 +212,59 @@ class Loops {
           [&]<class P>(const P& primitive) {
             constexpr int m = P::kRows;
             Vec<m> phi;
-            Mat<m, 6> blocks[2];
-            primitive.phi(f[at(c.body1)], f[at(c.body2)], phi);
-            primitive.jacobian(f[at(c.body1)], f[at(c.body2)], blocks[0], blocks[1]);
-            p.Phi.segment<m>(row) = unit * (phi - constant_.segment<m>(c.row));
-            for (const int side : {0, 1}) {
-              const int body = side == 0 ? c.body1 : c.body2;
-              const Mat<m, 3> shift = unit * blocks[side].template leftCols<3>(),
-                              turn = unit * blocks[side].template rightCols<3>();
-              p.Phi_x.block<m, 6>(row, 12 * c.joint + 6 * side) << lengths_.bodies[at(body)] * shift * f[at(body)].A,
-                  turn;
-              if (body > 0) p.J.block<m, 6>(row, 6 * (body - 1)) << lengths_.whole * shift, turn;
+            Mat<m, 6> gradient[2];
+            primitive.phi(frames[at(c.body1)], frames[at(c.body2)], phi);
+            primitive.jacobian(frames[at(c.body1)], frames[at(c.body2)], gradient[0], gradient[1]);
+            for (int i = 0; i < m; ++i) {
+              if (plane_ && !std::ranges::binary_search(plane_->rows, c.row + i)) continue;
+              f(row++, c, unit * (phi(i) - constant_(c.row + i)),
+                std::array<Vec<6>, 2>{unit * gradient[0].row(i), unit * gradient[1].row(i)});
             }
-            row += m;
           },
           c.primitive);
     }
+  }
+
+  // The gradient in the columns of J: of a body in the plane, shifts along t1 and t2 and the turn about n.
+  using OfBody = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 6>;
+  OfBody in_columns(int body, const Vec<6>& gradient) const {
+    OfBody out(width_);
+    if (plane_)
+      out << lengths_.whole * gradient(plane_->t1), lengths_.whole * gradient(plane_->t2),
+          gradient.tail<3>().dot(plane_->bodies[at(body)].n);
+    else
+      out << lengths_.whole * gradient.head<3>().transpose(), gradient.tail<3>().transpose();
+    return out;
+  }
+
+  // A joint's equation sees x as a displacement of its body alone, so that Phi_x consists of the same blocks as J.
+  void evaluate(Position& p, bool with_x = false) const {
+    p.Phi.setZero(rows_);
+    p.J.setZero(rows_, width_ * d_.n);
+    if (with_x) p.Phi_x.setZero(rows_, x_.size());
+    for_each_equation(p.q, [&](Index row, const Constraint& c, double phi, const std::array<Vec<6>, 2>& gradient) {
+      p.Phi(row) = phi;
+      for (const int side : {0, 1}) {
+        const int body = side == 0 ? c.body1 : c.body2;
+        const Vec<6>& g = gradient[at(side)];
+        if (body > 0) p.J.row(row).segment(width_ * (body - 1), width_) = in_columns(body, g);
+        if (!with_x) continue;
+        const Matrix3d turned = body > 0 ? A(Vector4d(p.q.segment<4>(7 * (body - 1) + 3))) : Matrix3d::Identity();
+        p.Phi_x.row(row).segment<6>(12 * c.joint + 6 * side)
+            << lengths_.bodies[at(body)] * g.head<3>().transpose() * turned,
+            g.tail<3>().transpose();
+      }
+    });
+  }
+
+  VectorXd in_space(const VectorXd& step) const {
+    VectorXd out = VectorXd::Zero(6 * d_.n);
+    for (int i = 0; i < d_.n; ++i) {
+      out(6 * i + plane_->t1) = step(3 * i);
+      out(6 * i + plane_->t2) = step(3 * i + 1);
+      out.segment<3>(6 * i + 3) = step(3 * i + 2) * plane_->bodies[at(i + 1)].n;
+    }
+    return out;
   }
 
   void displace(VectorXd& q, const VectorXd& step) const {
@@ -219,7 +294,8 @@ class Loops {
         return true;
       }
       before = longest;
-      displace(p.q, step * std::min(1.0, kLongest / longest));
+      step *= std::min(1.0, kLongest / longest);
+      displace(p.q, plane_ ? in_space(step) : step);
     }
     return false;
   }
@@ -251,6 +327,7 @@ class Loops {
       for (Position& p : all) {
         if (!close(p)) return false;
         if (!is_regular(p)) continue;
+        evaluate(p, true);
         gap = std::max(gap, p.gap);
         A.middleRows(row, redundant_) = p.L.transpose() * p.Phi_x;
         b.segment(row, redundant_) = A.middleRows(row, redundant_) * x_ - p.L.transpose() * p.Phi;
@@ -269,14 +346,46 @@ class Loops {
 
   const MechanismData& d_;
   const double threshold_;
+  const PlanarModel* plane_;
+  const int width_;  // columns of J per body
   const JointLengths lengths_;
   VectorXd constant_;  // of the rows' laws
   std::vector<Constraint> given_, moved_;
   int rows_ = 0;
+  std::vector<int> kept_;   // rows within the plane
   Index redundant_ = 0;     // equations at regular positions
   VectorXd x_, direction_;  // x per joint and side: shift in lengths of the body, turn
   std::mt19937_64 random_{1};
 };
+
+// Returns whether all bodies can lie at heights over the plane that their joints agree on, to the last digit. A point,
+// or a plane along the plane of motion, joins the heights of two bodies.
+bool heights_agree(const MechanismData& d, const PlanarModel& plane) {
+  std::vector<double> height(d.bodies.size(), NAN), size(d.bodies.size(), 0.0);
+  height[0] = 0;
+  for (bool goes_on = true; goes_on;) {
+    goes_on = false;
+    for (const Constraint& c : d.constraints) {
+      const auto* point = std::get_if<Coincidence>(&c.primitive);
+      const auto* dot2 = std::get_if<Dot2>(&c.primitive);
+      if (!point && (!dot2 || std::ranges::binary_search(plane.rows, c.row))) continue;
+      const Vector3d &s1 = point ? point->s1 : dot2->s1, &s2 = point ? point->s2 : dot2->s2;
+      const std::size_t i = at(c.body1), k = at(c.body2);
+      const double rise = plane.bodies[i].n.dot(s1) - plane.bodies[k].n.dot(s2);
+      const double scale = std::max({size[i], size[k], s1.norm(), s2.norm()});
+      if (std::isnan(height[i]) && std::isnan(height[k])) continue;
+      if (std::isnan(height[k])) {
+        height[k] = height[i] + rise, size[k] = scale, goes_on = true;
+      } else if (std::isnan(height[i])) {
+        height[i] = height[k] - rise, size[i] = scale, goes_on = true;
+      } else if (!(std::abs(height[i] + rise - height[k]) <= kExact * scale)) {
+        return false;
+      }
+    }
+  }
+  const auto lifts = [&](const RowLaw& law) { return !std::ranges::binary_search(plane.rows, law.row); };
+  return std::ranges::none_of(height, [](double h) { return std::isnan(h); }) && std::ranges::none_of(d.laws, lifts);
+}
 
 }  // namespace
 
@@ -303,6 +412,9 @@ JointLengths joint_lengths(const MechanismData& data) {
 
 void close_rounded_loops(MechanismData& data, double tolerance) {
   if (!(tolerance > 0) || data.n == 0 || data.n > kMostBodies || !closes_loops(data)) return;
+  // Of a planar mechanism, equations across the plane are redundant and agree wherever the heights do.
+  const PlanarModel* plane = data.planar.get();
+  if (plane && heights_agree(data, *plane) && Loops(data, kReaches[0] * tolerance, plane).are_independent()) return;
   for (const double reach : kReaches) {
     Loops loops(data, reach * tolerance);
     const Loops::Outcome outcome = loops.search();

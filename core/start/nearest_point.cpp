@@ -53,7 +53,7 @@ class NearestPointSearch {
   bool guess_is_it() {
     const VectorXd x = equations_.retracted(x_guess_), F = equations_.values(x);
     if (!(largest(x - x_guess_) <= 4 * kEpsilon)) return false;  // only unit vectors are retracted
-    if (!(F.cwiseAbs().array() <= 4 * kEpsilon * equations_.magnitudes(x).array()).all()) return false;
+    if (!F.isZero(0) && !(F.cwiseAbs().array() <= 4 * kEpsilon * equations_.magnitudes(x).array()).all()) return false;
     settle_without_multipliers(x, F);
     equations_.accept(x);
     return true;

@@ -106,3 +106,38 @@ TEST_CASE("two hinges of a door are in line to within rounding, far from the ori
   const Mechanism mechanism(scene, nominal(scene));
   CHECK(Assembly(mechanism, 0).degrees_of_freedom() == 1);
 }
+
+TEST_CASE("many bodies in the plane of others, or over it, are seen through at sight or closed", "[rounded_loops]") {
+  // Squares of bars 1 m long side by side, whose couplers lie at a height of their own and whose last foot may not.
+  Scene scene;
+  const int squares = GENERATE(1, 8);
+  const bool is_closed = GENERATE(true, false);  // the guess
+  add_parameters(scene, {{"e", GENERATE(0.0, 1e-7)}, {"up", GENERATE(0.0, 0.3)}, {"twin", GENERATE(0.0, 1.0)}});
+  const std::string lean = is_closed ? "0" : "0.1";
+  const auto bar = [&](const std::string& name, const std::string& x, const std::string& y, const std::string& z) {
+    scene.bodies.push_back(body(name, vec("0", "0", "0"), vec(x, y, z), turned(lean)));
+  };
+  for (int i = 0; i <= squares; ++i) {
+    const std::string crank = "crank" + std::to_string(i), x = std::to_string(i);
+    bar(crank, x, "0.5", "0");
+    scene.joints.push_back(
+        hinge("foot" + x, "ground", vec(x, "0", i == squares ? "e" : "0"), crank, vec("0", "-0.5", "0")));
+    if (i == 0) continue;
+    const std::string before = "crank" + std::to_string(i - 1), coupler = "coupler" + x;
+    bar(coupler, x + "-0.5", "1", "up");
+    scene.joints.push_back(hinge("left" + x, before, vec("0", "0.5", "up"), coupler, vec("-0.5", "0", "0")));
+    scene.joints.push_back(hinge("right" + x, coupler, vec("0.5", "0", "0"), crank, vec("0", "0.5", "up")));
+  }
+  if (scene.parameters[2].value > 0) {  // a second coupler, redundant in the plane as well, and a bit too long
+    bar("twin", "0.5", "0.8", "0");
+    scene.joints.push_back(hinge("twin0", "crank0", vec("0", "0.3", "0"), "twin", vec("-0.5", "0", "0")));
+    scene.joints.push_back(hinge("twin1", "twin", vec("0.5+e", "0", "0"), "crank1", vec("0", "0.3", "0")));
+  }
+  CAPTURE(squares, is_closed, nominal(scene).transpose());
+  CHECK(found_in(scene).made == (scene.parameters[0].value > 0));
+  const Mechanism mechanism(scene, nominal(scene));
+  const Assembly assembly(mechanism, 0);
+  REQUIRE(assembly.result().ok);
+  CHECK(assembly.degrees_of_freedom() == 1);
+  if (scene.parameters[0].value == 0) CHECK(mechanism.data().planar);
+}
