@@ -117,7 +117,7 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
     model.data.not_planar = std::move(plane.reason);
   };
   find_plane();
-  close_rounded_loops(model.data, scene.simulation.redundancy_tolerance);
+  close_rounded_loops(model.data, scene.simulation.redundancy_tolerance, model.fields.programs().independent_loops);
   if (model.data.rounded.made) find_plane();
   return std::move(model.data);
 }

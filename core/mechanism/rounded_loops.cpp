@@ -31,7 +31,9 @@ constexpr double kExact = 1e-12;  // what agrees as well has all digits
 // The joints' equations. Lengths are in units of the mechanism's. Rows that tie joints or drive them are left out.
 class Loops {
  public:
-  enum class Outcome { exact, moved, none };
+  // independent: no equation is redundant; open: the joints cannot be closed; exact: redundant ones agree; moved: they
+  // do with the correction.
+  enum class Outcome { independent, open, exact, moved, none };
 
   // With a plane, only motion and equations within it are looked at.
   Loops(const MechanismData& data, double threshold, const PlanarModel* plane = nullptr)
@@ -54,21 +56,27 @@ class Loops {
     direction_ = VectorXd::Zero(6 * d_.n);
   }
 
-  // Returns whether no equation is redundant where the joints are closed.
-  bool are_independent() {
+  // Looks for redundant equations where the joints are closed: independent, open or none.
+  Outcome look() {
     Position p = guess();
     double largest = INFINITY;
     const std::vector<SparseEntry> J = d_.n < kManyBodies ? std::vector<SparseEntry>() : entries(p, largest);
-    return largest <= exact(p) ? rank(J, threshold_) == rows_ : close(p) && p.L.cols() == 0;
+    const bool is_closed = largest <= exact(p), is_near = is_closed || close(p);
+    if (!is_closed && stays_open(p)) return Outcome::open;
+    const bool independent = is_closed ? rank(J, threshold_) == rows_ : is_near && p.L.cols() == 0;
+    return independent ? Outcome::independent : Outcome::none;
   }
 
-  // Finds the correction x of the numbers that closes the loops, unless they have all digits.
+  // Finds the correction x of the numbers that closes the loops, unless they have all digits or stay open.
   Outcome search() {
     constexpr int kBatches = 8, kBatch = 6;
     std::vector<Position> all{guess()};
     if (agrees_at_sight(all[0])) return Outcome::exact;
-    if (!close(all[0])) return Outcome::none;
-    if (all[0].L.cols() == 0 || agrees(all[0])) return Outcome::exact;
+    const bool is_near = close(all[0]);
+    if (stays_open(all[0])) return Outcome::open;
+    if (!is_near) return Outcome::none;
+    if (all[0].L.cols() == 0) return Outcome::independent;
+    if (agrees(all[0])) return Outcome::exact;
     redundant_ = all[0].L.cols();
     for (int batch = 0; batch < kBatches; ++batch) {
       std::vector<Position> fresh;
@@ -134,6 +142,11 @@ class Loops {
     return p;
   }
 
+  // Returns whether no correction within the threshold closes the joints: it moves two points and two axes each.
+  bool stays_open(const Position& p) const {
+    constexpr double kMoves = 10;
+    return p.Phi.lpNorm<Eigen::Infinity>() > kMoves * threshold_;
+  }
   bool is_regular(const Position& p) const { return p.L.cols() == redundant_; }
   bool agrees(const Position& p) const { return p.gap <= exact(p); }
   double exact(const Position& p) const {  // coordinates far from the origin have coarser digits
@@ -410,16 +423,22 @@ JointLengths joint_lengths(const MechanismData& data) {
   return lengths;
 }
 
-void close_rounded_loops(MechanismData& data, double tolerance) {
-  if (!(tolerance > 0) || data.n == 0 || data.n > kMostBodies || !closes_loops(data)) return;
+void close_rounded_loops(MechanismData& data, double tolerance, IndependentLoops& known) {
+  if (!(tolerance > 0) || data.n == 0 || data.n > kMostBodies || known.in_space || !closes_loops(data)) return;
+  using Outcome = Loops::Outcome;
   // Of a planar mechanism, equations across the plane are redundant and agree wherever the heights do.
-  const PlanarModel* plane = data.planar.get();
-  if (plane && heights_agree(data, *plane) && Loops(data, kReaches[0] * tolerance, plane).are_independent()) return;
+  if (const PlanarModel* plane = data.planar.get(); plane && heights_agree(data, *plane)) {
+    if (known.in_plane) return;
+    const Outcome outcome = Loops(data, kReaches[0] * tolerance, plane).look();
+    known.in_plane = outcome == Outcome::independent;
+    if (outcome != Outcome::none) return;
+  }
   for (const double reach : kReaches) {
     Loops loops(data, reach * tolerance);
-    const Loops::Outcome outcome = loops.search();
-    if (outcome == Loops::Outcome::none) continue;
-    if (outcome == Loops::Outcome::exact) return;
+    const Outcome outcome = loops.search();
+    if (outcome == Outcome::none) continue;
+    known.in_space = outcome == Outcome::independent;
+    if (outcome != Outcome::moved) return;
     data.rounded = loops.finding();
     data.rounded.made = data.rounded.part <= tolerance;
     if (data.rounded.made) return loops.write(data.constraints);

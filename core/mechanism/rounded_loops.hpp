@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/scene_programs.hpp"
 
 namespace mbsopt {
 
@@ -30,8 +31,9 @@ JointLengths joint_lengths(const MechanismData& data);
 
 // Moves points and axes of data.constraints if that takes no more than the tolerance: turns in rad, shifts in lengths
 // of the mechanism, and by far less than a body's own length. Sets data.rounded also if it takes more. A tolerance of 0
-// changes nothing. Derivatives hold x fixed.
-void close_rounded_loops(MechanismData& data, double tolerance);
+// changes nothing. Derivatives hold x fixed. Where equations are independent at one geometry, they are at almost every
+// one: `known` keeps that for other parameter values of the scene.
+void close_rounded_loops(MechanismData& data, double tolerance, IndependentLoops& known);
 
 // data.rounded in words, for a warning (made) or after a failed assembly.
 std::string in_words(const MechanismData& data);

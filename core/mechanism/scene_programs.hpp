@@ -1,11 +1,12 @@
-// The expressions of a scene as programs, each compiled once. Mechanisms of the scene at other parameter values share
-// them. Several threads may use them.
+// What mechanisms of a scene at different parameter values share: its expressions as programs, each compiled once, and
+// what is known of its loops. Several threads may use them.
 //
 //   const auto programs = std::make_shared<ScenePrograms>(scene);
 //   const Mechanism first(scene, rho, active, {}, programs), second(scene, other_rho, active, {}, programs);
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <unordered_map>
@@ -15,9 +16,16 @@
 
 namespace mbsopt {
 
+// Whether the equations of a mechanism's loops were found independent: within its plane, or in space.
+struct IndependentLoops {
+  std::atomic<bool> in_plane = false, in_space = false;
+};
+
 class ScenePrograms {
  public:
   explicit ScenePrograms(const Scene& scene);
+
+  IndependentLoops independent_loops;
 
   const Symbols& symbols() const { return symbols_; }  // parameters (inputs, in order), definitions, signals
 
