@@ -183,7 +183,30 @@ RightSingular right_singular(const MatrixXd& A) {
   return {svd.singularValues(), svd.matrixV()};
 }
 
+// Of G = A'A, or AA' if that is smaller: its least eigenvalue, and the vector by inverse iteration. As long as the
+// singular value is far above the root of rounding, this has no fewer digits than the decomposition of A.
 LeastSingular least_singular(const MatrixXd& A) {
+  constexpr double kFarAboveRounding = 1e-5;  // of the largest
+  constexpr double kShift = 1e-10;            // of the largest eigenvalue, so that the matrix has an inverse
+  const bool is_wide = A.rows() < A.cols();
+  const MatrixXd G = is_wide ? MatrixXd(A * A.transpose()) : MatrixXd(A.transpose() * A);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(G, Eigen::EigenvaluesOnly);
+  const double least = gram.eigenvalues()(0), largest = gram.eigenvalues().tail<1>()(0);
+  if (least > kFarAboveRounding * kFarAboveRounding * largest) {
+    MatrixXd shifted = G;
+    shifted.diagonal().array() -= least - kShift * largest;
+    const Eigen::LLT<MatrixXd> factor(shifted);
+    VectorXd inner = VectorXd::LinSpaced(G.rows(), 1, 2), before;  // of no symmetry of mechanisms
+    for (int k = 0; factor.info() == Eigen::Success && k < 8; ++k) {
+      before = std::exchange(inner, factor.solve(inner).normalized());
+      if ((inner - before).norm() > 1e-14) continue;
+      VectorXd outer = is_wide ? VectorXd(A.transpose() * inner) : VectorXd(A * inner);
+      const double value = outer.norm();
+      outer /= value;
+      if (is_wide) inner.swap(outer);
+      return {value, outer, inner};
+    }
+  }
   const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
   const Index last = svd.singularValues().size() - 1;
   return {svd.singularValues()(last), svd.matrixU().col(last), svd.matrixV().col(last)};
