@@ -20,6 +20,7 @@
 #include "optim/differences/difference_ladder.hpp"
 #include "optim/machine/on_threads.hpp"
 #include "optim/machine/stopwatch.hpp"
+#include "optim/objective/curvature_of_run.hpp"
 #include "optim/objective/objective_run.hpp"
 #include "optim/objective/obstructed_parameters.hpp"
 #include "optim/problem/load_cases.hpp"
@@ -97,21 +98,26 @@ Evaluator Evaluator::in(Scene scene, GradientMethod method) const {
   return other;
 }
 
+void Evaluator::gather_curvature() {
+  gathers_curvature_ = true;
+  for (Evaluator& of_case : cases_) of_case.gather_curvature();
+}
+
 void Evaluator::follow(const Eigen::VectorXd& rho) {
   for (Evaluator& of_case : cases_) of_case.follow(rho);
   if (!cases_.empty() || !last_.ok || last_.rho != rho || !last_.statistics.solved) return;
   if (!given_) given_ = std::make_shared<const Scene>(scene_);
   scene_.bodies = given_->bodies;
-  set_guess(scene_, Mechanism(*given_, rho, active(false), options_.user_forces),
+  set_guess(scene_, Mechanism(*given_, rho, active(false), options_.user_forces, programs_),
             {last_.y_initial.head(last_.y_initial.size() / 2), 0});
-  programs_ = std::make_shared<ScenePrograms>(scene_);
 }
 
 bool Evaluator::has_left_guess(const Eigen::VectorXd& rho) const {
   constexpr double kSame = 1e-6;  // relative
   if (!cases_.empty()) return cases_.front().has_left_guess(rho);
   if (!given_) return false;
-  const Assembly own(Mechanism(*given_, rho, active(false), options_.user_forces), scene_.simulation.start_time),
+  const Assembly own(Mechanism(*given_, rho, active(false), options_.user_forces, programs_),
+                     scene_.simulation.start_time),
       followed(mechanism(rho, false), scene_.simulation.start_time);
   if (!followed.result().ok) return false;
   if (!own.result().ok) return true;
@@ -298,13 +304,21 @@ bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* fr
   try {
     const Mechanism at_rho = mechanism(e.rho, sweep != Sweep::none);
     const RunOptions options{.frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
+    const bool gathers =
+        gathers_curvature_ && !frozen && sweep == Sweep::forward && !by_cvodes && !objectives_[0].running();
+    std::optional<CurvatureOfRun> curvature;
     const auto simulated = [&](std::span<const Cost> costs) {
       ++e.simulations;
-      return sweep == Sweep::forward    ? simulate_tlm(at_rho, settings, costs, {}, options)
+      TangentSampling sampling;
+      if (gathers)
+        sampling =
+            curvature.emplace(std::span(objectives_).first(1), variables_).sampling(at_rho, {}, settings.end_time);
+      return sweep == Sweep::forward    ? simulate_tlm(at_rho, settings, costs, sampling, options)
              : sweep == Sweep::backward ? simulate_adjoint(at_rho, settings, costs, options)
                                         : simulate(at_rho, settings, costs, {}, options);
     };
     result = run_objectives(objectives_, at_rho, settings, simulated, options_.progress);
+    if (curvature && result.ok()) e.curvature = curvature->matrix(0, e.rho);
   } catch (const SceneError& error) {  // a field that this rho drives out of its range
     e.message = error.what();
     return false;

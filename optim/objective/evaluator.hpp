@@ -61,6 +61,7 @@ struct Evaluation {
   Eigen::VectorXd psi;                                // per objective
   Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 if only values were requested
   std::vector<ExtremePiece> pieces;                   // with true_extremes and gradients; the most extreme ones first
+  Eigen::MatrixXd curvature;                          // of gather_curvature(), where it was at hand
   GradientMethod method = GradientMethod::automatic;  // the one used; automatic where no simulation was needed
   std::string choice;                                 // why, in words, where there is something to say
   std::vector<std::string> warnings;                  // sentences on doubts about these numbers
@@ -107,6 +108,10 @@ class Evaluator {
   // CVODES cannot take given steps and throws std::invalid_argument. Not in load cases.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
   Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
+
+  // From now on gradients come with the Gauss-Newton matrix of the first objective, where a forward sweep meets all
+  // instants that it looks at.
+  void gather_curvature();
 
   // The poses of the last evaluation, which is at rho, become the guess of the next ones if the drives determine them:
   // the mechanism stays in its assembly mode, also where the scene's own guess would lead to another one.
@@ -165,6 +170,7 @@ class Evaluator {
   std::vector<std::size_t> perhaps_unused_;  // variables that only what is written in C++ may use
   bool has_differentiated_ = false;          // gradients() has succeeded: no loop is a structure that cannot move
   Evaluation last_;
+  bool gathers_curvature_ = false;
   long simulations_ = 0;
   std::shared_ptr<const Problem> problem_;  // with load cases; else null
   std::vector<Evaluator> cases_;            // one for each
