@@ -13,6 +13,7 @@
 #include "core/linear/dense.hpp"
 #include "core/start/assembly.hpp"
 #include "optim/differences/difference_ladder.hpp"
+#include "optim/objective/one_to_one.hpp"
 #include "optim/problem/parameter_values.hpp"
 
 namespace mbsopt::inline optim {
@@ -50,6 +51,18 @@ struct FollowedMode::State {
     s.tail(layout.positions()) = rate * s.head(layout.positions());
     return s;
   }
+  std::vector<Index> modes() const {  // from slow to fast; one of each pair
+    std::vector<Index> of;
+    for (Index k = 0; k < x.eigenvalues.size(); ++k)
+      if (x.eigenvalues(k).imag() >= 0) of.push_back(k);
+    return of;
+  }
+  Eigen::MatrixXcd shapes() const {
+    const std::vector<Index> of = modes();
+    Eigen::MatrixXcd shapes(StateLayout{bodies()}.positions(), static_cast<Index>(of.size()));
+    for (std::size_t k = 0; k < of.size(); ++k) shapes.col(static_cast<Index>(k)) = shape(of[k]);
+    return shapes;
+  }
   // The displacements of a mode without units, of unit length.
   VectorXcd shape(Index mode) const {
     const Index half = StateLayout{bodies()}.positions();
@@ -59,7 +72,7 @@ struct FollowedMode::State {
 
 struct FollowedMode::Reference {
   std::once_flag once;
-  VectorXcd shape;
+  Eigen::MatrixXcd shapes;
 };
 
 FollowedMode::FollowedMode(const Scene& scene, const EigenvalueSpec& spec)
@@ -73,24 +86,18 @@ std::unique_ptr<FollowedMode::State> FollowedMode::state_at(const VectorXd& rho,
 
 Index FollowedMode::mode_of(const State& state, const UserForces& forces) const {
   std::call_once(reference_->once, [&] {
-    const std::unique_ptr<State> own = state_at(parameter_values(scene_), forces, false);
-    int number = 0;
-    for (Index k = 0; k < own->x.eigenvalues.size(); ++k) {
-      if (own->x.eigenvalues(k).imag() >= 0 && ++number == spec_.mode) reference_->shape = own->shape(k);
-    }
-    if (reference_->shape.size() == 0)
-      throw std::runtime_error(fmt::format("there is no mode {}: the initial state has {}", spec_.mode, number));
+    reference_->shapes = state_at(parameter_values(scene_), forces, false)->shapes();
+    if (reference_->shapes.cols() < spec_.mode)
+      throw std::runtime_error(
+          fmt::format("there is no mode {}: the initial state has {}", spec_.mode, reference_->shapes.cols()));
   });
-  Index best = 0;
-  double most = -1;
-  for (Index k = 0; k < state.x.eigenvalues.size(); ++k) {
-    const double alike = std::abs(reference_->shape.dot(state.shape(k)));
-    if (state.x.eigenvalues(k).imag() >= 0 && alike > most) {
-      most = alike;
-      best = k;
-    }
-  }
-  return best;
+  const std::vector<Index> modes = state.modes();
+  const MatrixXd alike = (reference_->shapes.adjoint() * state.shapes()).cwiseAbs2();
+  const Index found = one_to_one(alike)[static_cast<std::size_t>(spec_.mode - 1)];
+  if (found < 0)
+    throw std::runtime_error(fmt::format("mode {} does not exist here: there are {} modes in place of {}", spec_.mode,
+                                         modes.size(), reference_->shapes.cols()));
+  return modes[static_cast<std::size_t>(found)];
 }
 
 double FollowedMode::value_of(std::complex<double> lambda) const {

@@ -6,8 +6,9 @@
 // f: the equations of motion ydot = f(y, rho), y0(rho) the equilibrium from which the scene starts. (f_y)' v is the
 // derivative of f_y and f_rho along v: differences of the exact adjoint f_y'w, f_rho'w at y0 +- h v, extrapolated.
 //
-// The mode has its number at the scene's own parameter values, from slow to fast as in `linearise`. At other values it
-// is the mode with the most similar shape. So its value depends on the parameters only, not on the path to them.
+// The mode has its number at the scene's own parameter values, from slow to fast as in `linearise`. At other values all
+// modes are assigned to those, one to one, so that their shapes are as similar as possible. So the value depends on the
+// parameters only, not on the path to them, and objectives of different modes never follow the same one.
 #pragma once
 
 #include <Eigen/Core>

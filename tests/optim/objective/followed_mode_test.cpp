@@ -64,3 +64,31 @@ TEST_CASE("an eigenvalue objective fails in words without an equilibrium and wit
   scene.bodies[0].angular_velocity = {0.0, 0.0, 1.0}, scene.bodies[0].velocity = vec("l", "0", "0");
   CHECK_THROWS_WITH(FollowedMode(scene, {1, "frequency"}).value(nominal(scene), {}), Catch::Contains("no equilibrium"));
 }
+
+// Along rho the modes of a double pendulum pass from its bobs against each other to both as one: at each rho, one of
+// the two objectives has the product of frequencies that det K/det M gives for the other.
+TEST_CASE("objectives of two modes never follow the same one", "[followed_mode]") {
+  Scene scene = hanging_pendulum();
+  add_parameters(scene, {{"k2", 0.01}});
+  scene.bodies.push_back(
+      plain_body("bob2", kMass, {kInertia, kInertia, kInertia, 0.0, 0.0, 0.0}, vec("0", "-3*l", "0")));
+  scene.joints.push_back(hinge("elbow", "bob", vec("0", "-l", "0"), "bob2", vec("0", "l", "0")));
+  scene.joints[1].normal1 = vec("1", "0", "0"), scene.joints[1].normal2 = vec("1", "0", "0");
+  Rsda torsion;
+  torsion.joint = "elbow", torsion.stiffness = f("k2");
+  scene.forces.push_back({"torsion2", torsion});
+  const FollowedMode first(scene, {1, "frequency"}), second(scene, {2, "frequency"});
+  VectorXd rho = nominal(scene);
+  rho(1) = 0;
+  for (const double k2 : {0.01, 1.0, 30.0, 300.0, 1e4}) {
+    for (const double k : {0.0, 5.0, 500.0, 5e4}) {
+      rho(0) = k, rho(3) = k2;
+      const double l = rho(2), w = kMass * kGravity * l, J = kInertia + kMass * l * l, both = 4 * kMass * l * l;
+      // angles of both bobs to the vertical: M = [J + both, both/2; both/2, J],  K = [k + k2 + 3 w, -k2; -k2, k2 + w]
+      const double det_M = (J + both) * J - both * both / 4, det_K = (k + k2 + 3 * w) * (k2 + w) - k2 * k2;
+      const double turns = std::pow(2 * std::numbers::pi, 2);
+      CAPTURE(k, k2);
+      CHECK(first.value(rho, {}) * second.value(rho, {}) * turns == Approx(std::sqrt(det_K / det_M)).epsilon(1e-6));
+    }
+  }
+}
