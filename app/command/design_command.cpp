@@ -72,7 +72,6 @@ void add_to_result(Json& result, const DesignResult& design) {
     optimizer["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
   if (design.mode && design.mode->of > 0) optimizer["assembly_mode"] = mode_json(*design.mode);
   if (design.closing_steps > 0) optimizer["closing_steps"] = design.closing_steps;
-  if (design.limit_rounds > 0) optimizer["limit_rounds"] = design.limit_rounds;
   for (const DesignConflict& c : design.conflicts)
     result["conflicts"].push_back({{"limit", c.limit}, {"missed", c.missed}, {"price", c.price}});
 }
@@ -133,8 +132,6 @@ void show_design(RunPage& page, const DesignResult& design, const std::string& e
                                                  : "");
   if (std::ranges::any_of(design.constraints, [](const DesignConstraint& c) { return c.price != 0; }))
     page.say(fmt::format("price: decrease of '{}' per unit by which the limit is relaxed", design.objective));
-  if (design.limit_rounds > 0)
-    out << fmt::format("{} to make limits hold for true extremes\n", counted(design.limit_rounds, "further round"));
   if (design.conflicts.empty()) return;
   page.both(
       table_of(result.at("conflicts"), {{"limit in conflict", "limit"}, {"missed by", "missed"}, {"price", "price"}}));

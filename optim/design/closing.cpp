@@ -23,24 +23,6 @@ constexpr int kMostSteps = 100;
 constexpr int kUniform = 36;        // instants of a run whose objectives have no samples
 constexpr double kShortest = 1e-3;  // weight of |p| beside the equations, which may contradict each other
 
-// Sampled times, and halfway between; uniform ones where there are none.
-std::vector<double> instants(const Evaluator& evaluator) {
-  const SimulationSettings& s = evaluator.scene().simulation;
-  std::vector<double> times{s.start_time}, all;
-  for (const Objective& o : evaluator.objectives())
-    for (const auto* samples : {&o.samples(), &o.residuals()})
-      for (const Objective::Sample& sample : *samples) times.push_back(sample.time);
-  if (times.size() == 1)
-    for (int k = 1; k <= kUniform; ++k) times.push_back(s.start_time + (s.end_time - s.start_time) * k / kUniform);
-  std::ranges::sort(times);
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  for (const double t : times) {
-    if (!all.empty()) all.push_back((all.back() + t) / 2);
-    all.push_back(t);
-  }
-  return all;
-}
-
 struct Defects {
   VectorXd e;    // per instant and load case
   MatrixXd e_x;  // in scaled variables
@@ -83,11 +65,28 @@ VectorXd reflection(const Defects& at, const VectorXd& sizes, const VectorXd& lo
 
 }  // namespace
 
+std::vector<double> closing_instants(const Evaluator& evaluator) {
+  const SimulationSettings& s = evaluator.scene().simulation;
+  std::vector<double> times{s.start_time}, all;
+  for (const Objective& o : evaluator.objectives())
+    for (const auto* samples : {&o.samples(), &o.residuals()})
+      for (const Objective::Sample& sample : *samples) times.push_back(sample.time);
+  if (times.size() == 1)
+    for (int k = 1; k <= kUniform; ++k) times.push_back(s.start_time + (s.end_time - s.start_time) * k / kUniform);
+  std::ranges::sort(times);
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  for (const double t : times) {
+    if (!all.empty()) all.push_back((all.back() + t) / 2);
+    all.push_back(t);
+  }
+  return all;
+}
+
 ClosedStart close_start(const DesignProgram& program, const std::function<bool()>& go_on) {
   ClosedStart start{program.x_start()};
   std::vector<std::vector<double>> times;
   for (std::size_t c = 0; c < program.evaluator().cases(); ++c)
-    times.push_back(instants(program.evaluator().of_case(c)));
+    times.push_back(closing_instants(program.evaluator().of_case(c)));
   const VectorXd& lower = program.x_lower;
   const VectorXd& upper = program.x_upper;
   const VectorXd ranges = upper - lower;

@@ -15,6 +15,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <vector>
 
 #include "optim/design/design_program.hpp"
 
@@ -26,6 +27,9 @@ struct ClosedStart {
   int steps = 0;        // 0: it was not moved
   double defect = 0;    // max e_k at the start [m, rad]
 };
+
+// At which it looks: those of samples, or uniform ones where there are none, and halfway between.
+std::vector<double> closing_instants(const Evaluator& evaluator);
 
 // From the start of the program. go_on: asked before every step.
 ClosedStart close_start(const DesignProgram& program, const std::function<bool()>& go_on = {});

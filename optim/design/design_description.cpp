@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/expression/did_you_mean.hpp"
-#include "optim/design/true_limits.hpp"
 #include "optim/solver/optimality.hpp"
 
 namespace mbsopt::inline optim {
@@ -17,7 +16,8 @@ namespace {
 // that.
 constexpr double kSettled = 1000;
 constexpr double kTouches = 1e-5;  // relative to the bound's size: the barrier keeps solutions this near to a bound
-constexpr double kWide = 10;       // sizes of a variable: the barrier keeps it as near to bounds that are wider
+constexpr double kTrueLimitTolerance = 1e-6;  // of an equality of a true extreme; inequalities hold exactly
+constexpr double kWide = 10;  // sizes of a variable: the barrier keeps it as near to bounds that are wider
 
 bool touches(double value, const std::optional<double>& bound, double size) {
   return bound && std::abs(value - *bound) <= kTouches * size;
@@ -106,7 +106,7 @@ void judge_stationarity(const OptimizerSpec& optimizer, DesignResult& result) {
                          result.optimality));
 }
 
-// Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
+// Says where a limit on an extreme does not hold for the true one.
 void judge_true_extremes(const DesignProgram& program, DesignResult& result) {
   if (result.status == SolverStatus::infeasible) return;  // the conflicts name what is missed
   bool beyond = false;
@@ -198,14 +198,14 @@ void describe_end(const DesignProgram& program, const NlpResult& solution, Desig
   }
 }
 
-void describe_solution(DesignProgram& program, const LimitedSolution& rounds, DesignResult& result) {
-  const Eigen::VectorXd& x = rounds.solution.x;
+void describe_solution(DesignProgram& program, const Eigen::VectorXd& x, DesignResult& result) {
+  const std::vector<std::optional<double>> true_values = program.evaluator().true_values(result.rho);
   result.final_evaluation = program.evaluation(result.rho);
-  describe_objective(program, rounds.true_values, result);
+  describe_objective(program, true_values, result);
   result.true_violation = 0;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
-    c.true_value = rounds.true_values[static_cast<std::size_t>(program.psi_of(static_cast<Eigen::Index>(i)))];
+    c.true_value = true_values[static_cast<std::size_t>(program.psi_of(static_cast<Eigen::Index>(i)))];
     c.true_violation = missed(c, c.true_value.value_or(c.value));
     if (c.true_value) c.violation = c.true_violation;
     result.true_violation =
@@ -222,8 +222,7 @@ void describe_solution(DesignProgram& program, const LimitedSolution& rounds, De
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
     const Eigen::Index row = static_cast<Eigen::Index>(i);
-    const double fall =
-        found.multipliers(row) * program.c_scale(row) / (program.f_scale * program.size(row) * rounds.slopes(row));
+    const double fall = found.multipliers(row) * program.c_scale(row) / (program.f_scale * program.size(row));
     const bool equality = is_equality(c), binds = found.binds(row, program.spec().optimizer.tolerance);
     c.price = equality ? fall : binds ? std::abs(fall) : 0;
     c.at_lower = c.at_lower || (binds && fall < 0);

@@ -3,7 +3,6 @@
 
 #include "optim/design/design_program.hpp"
 #include "optim/design/design_result.hpp"
-#include "optim/design/limit_rounds.hpp"
 
 namespace mbsopt::inline optim {
 
@@ -13,9 +12,9 @@ void describe_start(const DesignProgram& program, const Evaluation& start, Desig
 // Values of the variables and constraints at the end of the search; result.rho is set already.
 void describe_end(const DesignProgram& program, const NlpResult& solution, DesignResult& result);
 
-// Evaluates the solution once more: true extremes, optimality, prices of limits, limits in conflict. A limit whose
+// Evaluates the solution at x once more: true extremes, optimality, prices of limits, limits in conflict. A limit whose
 // multiplier balances less of the gradient than the optimiser's tolerance does not bind.
-void describe_solution(DesignProgram& program, const LimitedSolution& rounds, DesignResult& result);
+void describe_solution(DesignProgram& program, const Eigen::VectorXd& x, DesignResult& result);
 
 // Takes `converged` back if the optimality of a solved least-squares fit is not small, or true extremes break limits.
 void judge_solution(const DesignProgram& program, DesignResult& result);

@@ -112,6 +112,7 @@ DesignProgram::DesignProgram(const Problem& problem, const DesignOptions& option
       abandoned_(std::move(abandoned)),
       has_squares_(sums_squares(problem_, spec_, evaluator_)),
       gauss_newton_(has_squares_ || spec_.optimizer.hessian == "gauss_newton") {
+  if (has_squares_) evaluator_.gather_curvature();
   x_lower = scaling_.x_lower();
   x_upper = scaling_.x_upper();
   if (!spec_.sharpness && !spec_.optimizer.is_sqp()) spec_.sharpness = sharpness();
@@ -124,7 +125,12 @@ DesignProgram::DesignProgram(const Problem& problem, const DesignOptions& option
   for (Index i = 0; i < m; ++i) {
     const double size = std::max(std::abs(bound(i).lower.value_or(0)), std::abs(bound(i).upper.value_or(0)));
     if (size > 0) size_(i) = size;
-    set_bounds(i, bound(i).lower, bound(i).upper);
+    c_lower(i) = bound(i).lower.value_or(-kInfinity) / size_(i);
+    c_upper(i) = bound(i).upper.value_or(kInfinity) / size_(i);
+    if (spec_.optimizer.is_sqp() && limited(i).is_extreme() && c_lower(i) < c_upper(i)) {
+      c_lower(i) += kInsideExtremes;
+      c_upper(i) -= kInsideExtremes;
+    }
   }
 }
 
@@ -237,17 +243,6 @@ Evaluation DesignProgram::start_from(const VectorXd& x_start, const std::optiona
     best_violations_ = violations_of(start);
   }
   return start;
-}
-
-void DesignProgram::set_bounds(Index constraint, const std::optional<double>& lower,
-                               const std::optional<double>& upper) {
-  c_lower(constraint) = lower.value_or(-kInfinity) / size_(constraint);
-  c_upper(constraint) = upper.value_or(kInfinity) / size_(constraint);
-  if (spec_.optimizer.is_sqp() && limited(constraint).is_extreme() && c_lower(constraint) < c_upper(constraint)) {
-    c_lower(constraint) += kInsideExtremes;
-    c_upper(constraint) -= kInsideExtremes;
-  }
-  if (best_.ok) best_violations_ = violations_of(best_);
 }
 
 double DesignProgram::violations_of(const Evaluation& e) const {

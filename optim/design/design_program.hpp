@@ -62,8 +62,6 @@ class DesignProgram : public NonlinearProgram {
   Eigen::Index psi_of(Eigen::Index constraint) const;
   // The values that are minimised, one of each case.
   Eigen::VectorXd minimised(const Eigen::VectorXd& psi) const;
-  // Other bounds for the objective of a constraint; the best point is judged by them from now on.
-  void set_bounds(Eigen::Index constraint, const std::optional<double>& lower, const std::optional<double>& upper);
   long hessian_gradients() const { return hessian_gradients_; }            // that second derivatives took
   const std::string& hessian_failure() const { return hessian_failure_; }  // the first, in words
 

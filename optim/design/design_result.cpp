@@ -11,19 +11,21 @@ std::string DesignConstraint::in_words() const {
   return load_case.empty() ? objective : fmt::format("{} ({})", objective, load_case);
 }
 
-void DesignResult::add_work_of(const DesignResult& earlier) {
+void DesignResult::add_counts(const DesignResult& of) {
+  iterations += of.iterations;
+  evaluations += of.evaluations;
+  failed_evaluations += of.failed_evaluations;
+  simulations += of.simulations;
+  wall_seconds += of.wall_seconds;
+}
+
+void DesignResult::follow(DesignResult earlier) {
+  add_counts(earlier);
   objective_initial = earlier.objective_initial;
-  iterations += earlier.iterations;
-  evaluations += earlier.evaluations;
-  failed_evaluations += earlier.failed_evaluations;
-  simulations += earlier.simulations;
-  wall_seconds += earlier.wall_seconds;
   for (std::size_t v = 0; v < variables.size(); ++v) variables[v].initial = earlier.variables[v].initial;
   for (std::size_t c = 0; c < constraints.size(); ++c) constraints[c].initial = earlier.constraints[c].initial;
   for (std::size_t c = 0; c < cases.size(); ++c) cases[c].initial = earlier.cases[c].initial;
-}
-
-void DesignResult::prepend(std::vector<DesignRow> rows) {
+  std::vector<DesignRow> rows = std::move(earlier.history);
   const int before = rows.empty() ? 0 : rows.back().iteration;
   for (DesignRow& row : history) {
     if (row.iteration == 0) continue;

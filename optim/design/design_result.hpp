@@ -87,15 +87,17 @@ struct DesignResult : SolverOutcome {
   std::optional<long> seed;     // where the method is random
   NlpScale scale;               // by which convergence was judged
   std::string gradient_choice;  // method and why
-  int limit_rounds = 0;         // in which bounds of smooth extremes were moved so that the true ones keep their limits
   long simulations = 0;         // also those of second derivatives
   double wall_seconds = 0;
   std::vector<std::string> warnings;  // sentences
   std::optional<DesignMode> mode;     // where one was asked for, or the poses of the scene do not lead to the end's
   int closing_steps = 0;              // that led a start which does not close to one that does (closing.hpp)
+  // The objective and the violation of limits that count: those with true extremes where there are some.
+  double reached() const { return objective_true.value_or(objective_final); }
+  double missed() const { return final_evaluation.ok ? true_violation : violation; }
+  void add_counts(const DesignResult& of);
   // Adds the work of an earlier search, and starts where that one did.
-  void add_work_of(const DesignResult& earlier);
-  void prepend(std::vector<DesignRow> rows);  // of an earlier search
+  void follow(DesignResult earlier);
   bool is_at_boundary() const;  // a bound of a variable, or a limit, holds the solution back or just holds
   bool ok() const {
     return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||

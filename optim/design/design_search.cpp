@@ -1,16 +1,20 @@
 #include "optim/design/design_search.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <functional>
 #include <iterator>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "core/simulate/simulation_warnings.hpp"
+#include "optim/design/chosen_solver.hpp"
+#include "optim/design/closing.hpp"
 #include "optim/design/design_description.hpp"
 #include "optim/design/design_program.hpp"
-#include "optim/design/limit_rounds.hpp"
 #include "optim/differences/difference_comparison.hpp"
 #include "optim/machine/stopwatch.hpp"
 #include "optim/objective/gradient_doubts.hpp"
@@ -74,10 +78,19 @@ class SingleDesign {
   SingleDesign(const Problem& problem, const DesignOptions& options)
       : options_(options), program_(problem, until_abandoned(), [this] { return abandoned_.load(); }) {}
 
+  const std::vector<std::string>& doubts() const { return doubts_; }  // about derivatives at the start
+  // Whether the optimiser sees smooth extremes in place of true ones.
+  bool smooths() const {
+    if (program_.spec().optimizer.is_sqp()) return false;
+    return program_.objective().is_maximum() ||
+           std::ranges::any_of(program_.evaluator().objectives(), &Objective::is_extreme);
+  }
+  std::vector<double> instants() const { return closing_instants(program_.evaluator().of_case(0)); }
+
   DesignResult run() {
     begin();
     search();
-    if (start_.ok && rounds_.solution.point.ok) describe_last_point();
+    if (start_.ok && solution_.point.ok) describe_last_point();
     add_warnings();
     result_.simulations += simulations();
     result_.wall_seconds = stopwatch_.seconds();
@@ -103,8 +116,8 @@ class SingleDesign {
     result_.gradient_choice = start_.choice.empty() ? std::string(to_string(start_.method)) : start_.choice;
     describe_start(program_, start_, result_);
     if (!start_.ok || !options_.compare_differences) return;
-    std::ranges::move(difference_warnings(start_, program_.evaluator(), [this] { return !abandoned_; }),
-                      std::back_inserter(result_.warnings));
+    doubts_ = difference_warnings(start_, program_.evaluator(), [this] { return !abandoned_; });
+    result_.warnings.insert(result_.warnings.end(), doubts_.begin(), doubts_.end());
   }
 
   void search() {
@@ -114,10 +127,10 @@ class SingleDesign {
                                  result_.simulations + simulations()});
       return !options_.progress || options_.progress(result_.history.back());
     };
-    rounds_ = solve_in_rounds(program_, {progress, [this] { return abandoned_.load(); }}, result_);
-    static_cast<SolverOutcome&>(result_) = rounds_.solution;
+    solution_ = solve(program_, progress, result_);
+    static_cast<SolverOutcome&>(result_) = solution_;
     if (abandoned_) result_.end_on_request();
-    result_.algorithm = rounds_.solution.algorithm;
+    result_.algorithm = solution_.algorithm;
     result_.rho = program_.rho_at(result_.x);
   }
 
@@ -133,12 +146,11 @@ class SingleDesign {
 
   // The end point of a stopped search is evaluated as well; nothing abandons that.
   void describe_last_point() {
-    describe_end(program_, rounds_.solution, result_);
+    describe_end(program_, solution_, result_);
     describe_poses();
     if (abandoned_ && !options_.evaluate_stopped) return;
     is_describing_ = true;
-    if (abandoned_ || rounds_.true_values.empty()) rounds_.true_values = program_.evaluator().true_values(result_.rho);
-    describe_solution(program_, rounds_, result_);
+    describe_solution(program_, solution_.x, result_);
     if (!abandoned_) judge_solution(program_, result_);
   }
 
@@ -160,56 +172,145 @@ class SingleDesign {
   DesignProgram program_;
   DesignResult result_;
   Evaluation start_;
-  LimitedSolution rounds_;
+  std::vector<std::string> doubts_;
+  NlpResult solution_;
+};
+
+// The problem with a limit on the distance from dead points, where the Jacobian of joints and drives is singular.
+Problem away_from_dead_points(Problem problem, const std::vector<double>& instants) {
+  // Of smallest_singular_value, 1 at most. Limits between 0.02 and 0.1 lead from nearly all starts of paths of
+  // four-bars to an optimum; smaller ones are seen too late.
+  constexpr double kDistance = 0.1;
+  Sensor sensor;
+  sensor.quantity = "smallest_singular_value";
+  sensor.name = "distance_from_dead_points";
+  while (std::ranges::count(problem.scene.sensors, sensor.name, &Sensor::name) > 0) sensor.name += "_";
+  problem.scene.sensors.push_back(sensor);
+  for (const double t : instants) {
+    ObjectiveSpec& distance = problem.objectives.emplace_back();
+    distance.name = fmt::format("{} at {:.17g} s", sensor.name, t);
+    distance.samples.push_back({t, Expression::parse(sensor.name)});
+    ObjectiveBound& limit = problem.design->subject_to.emplace_back();
+    limit.objective = distance.name;
+    limit.lower = kDistance;
+  }
+  return problem;
+}
+
+// Searches that follow each other until one ends at an optimum, and the best of them:
+//
+//   the optimiser of the problem
+//   sqp      from the end of another local method that stalls or does not reach the limits, and of any method that has
+//            seen smooth extremes: it takes true ones
+//   ipopt    from the start, if `auto` finds no point near that satisfies the limits: it may come to another valley
+//   sqp      from the start with a distance from dead points, and from there without, if `auto` falls into one
+class Searches {
+ public:
+  Searches(const Problem& problem, const DesignOptions& options) : problem_(problem), options_(options) {}
+
+  DesignResult run() {
+    SingleDesign first(problem_, options_);
+    best_ = first.run();
+    const OptimizerSpec& spec = problem_.design->optimizer;
+    if (spec.type == "sqp" || !best_.final_evaluation.ok) return std::move(best_);
+    options_.compare_differences = false;
+    doubts_ = first.doubts();
+    const NloptMethod* const method = find_nlopt_method(spec.type);
+    const bool is_global = method && method->global;
+    if (spec.is_sqp()) {
+      if (best_.status == SolverStatus::infeasible) go_on_with_ipopt();
+      if (falls_into_dead_point()) go_round_dead_points(first.instants());
+    } else if (first.smooths() || (!is_global && is_stuck())) {
+      go_on_with_sqp();
+    }
+    return std::move(best_);
+  }
+
+ private:
+  bool is_stuck() const {
+    return best_.status == SolverStatus::no_progress || best_.status == SolverStatus::infeasible;
+  }
+  bool falls_into_dead_point() const {
+    return best_.status == SolverStatus::no_progress && best_.failed_evaluations > 0 &&
+           best_.final_evaluation.statistics.solved;
+  }
+
+  void go_on_with_ipopt() {
+    if (std::optional<SingleDesign> search = prepared(problem_, "ipopt", options_)) {
+      const bool smooths = search->smooths();
+      if (take(search->run()) && smooths) go_on_with_sqp();
+    }
+  }
+  void go_on_with_sqp() {
+    if (std::optional<SingleDesign> search = prepared(continued(best_), "sqp", options_)) take(search->run());
+  }
+  void go_round_dead_points(const std::vector<double>& instants) {
+    DesignOptions without_scale = options_;  // which has no place for the distances
+    without_scale.scale.reset();
+    std::optional<SingleDesign> search = prepared(away_from_dead_points(problem_, instants), "sqp", without_scale);
+    if (!search) return;
+    const DesignResult guarded = search->run();
+    best_.add_counts(guarded);
+    if (guarded.status == SolverStatus::stopped) return best_.end(guarded.status, guarded.message);
+    if (!guarded.final_evaluation.ok) return;
+    if (std::optional<SingleDesign> last = prepared(continued(guarded), "sqp", options_)) take(last->run());
+  }
+
+  // The problem from the end of a search, in its poses.
+  Problem continued(const DesignResult& from) const {
+    Problem next = problem_;
+    for (std::size_t p = 0; p < next.scene.parameters.size(); ++p)
+      next.scene.parameters[p].value = from.rho(static_cast<Eigen::Index>(p));
+    if (from.mode && !from.mode->bodies.empty()) next.scene.bodies = from.mode->bodies;
+    return next;
+  }
+
+  // None if the searches before have spent all that the optimiser may spend.
+  std::optional<SingleDesign> prepared(Problem problem, const char* type, const DesignOptions& options) {
+    const OptimizerSpec& given = problem_.design->optimizer;
+    OptimizerSpec& spec = problem.design->optimizer;
+    spec = {};
+    spec.type = type;
+    spec.tolerance = given.tolerance;
+    if (given.max_iterations) spec.max_iterations = *given.max_iterations - best_.iterations;
+    if (given.max_evaluations) spec.max_evaluations = *given.max_evaluations - best_.evaluations;
+    if (best_.status == SolverStatus::stopped || spec.max_iterations.value_or(1) <= 0 ||
+        spec.max_evaluations.value_or(1) <= 0)
+      return {};
+    return std::optional<SingleDesign>(std::in_place, problem, options);
+  }
+
+  // Keeps the better one. Returns whether that is the other.
+  bool take(DesignResult other) {
+    if (!is_better_than_best(other)) {
+      best_.add_counts(other);
+      if (other.status == SolverStatus::stopped) best_.end(other.status, other.message);
+      return false;
+    }
+    if (!other.mode && best_.mode) other.mode = best_.mode;
+    other.warnings.insert(other.warnings.begin(), doubts_.begin(), doubts_.end());
+    other.follow(std::move(best_));
+    best_ = std::move(other);
+    return true;
+  }
+  bool is_better_than_best(const DesignResult& other) const {
+    constexpr double kHeld = 1e-6;  // violation of limits: what ranks as feasible
+    if (!other.final_evaluation.ok) return false;
+    if (other.missed() > kHeld || best_.missed() > kHeld) return other.missed() < best_.missed();
+    const bool converges = other.status == SolverStatus::converged && best_.status != SolverStatus::converged;
+    return other.reached() < best_.reached() || (converges && other.reached() <= best_.reached());
+  }
+
+  const Problem& problem_;
+  DesignOptions options_;
+  std::vector<std::string> doubts_;
+  DesignResult best_;
 };
 
 }  // namespace
 
-namespace {
-
-// Leaves the next optimiser what the first one has not spent. Returns false if that is nothing.
-bool take_off(const DesignResult& spent, OptimizerSpec& spec) {
-  if (spec.max_iterations) *spec.max_iterations -= spent.iterations;
-  if (spec.max_evaluations) *spec.max_evaluations -= spent.evaluations;
-  return spec.max_iterations.value_or(1) > 0 && spec.max_evaluations.value_or(1) > 0;
-}
-
-}  // namespace
-
-// Where sqp finds no point near that satisfies the limits, Ipopt on smooth extremes may come to another valley from the
-// same start. Where another local method stalls, or does not reach the limits, sqp goes on from its end.
 DesignResult single_design(const Problem& problem, const DesignOptions& options) {
-  DesignResult result = SingleDesign(problem, options).run();
-  const OptimizerSpec& spec = problem.design->optimizer;
-  const bool stalled = result.status == SolverStatus::no_progress && !spec.is_sqp();
-  Problem again = problem;
-  OptimizerSpec& next = again.design->optimizer = {};
-  next.type = spec.is_sqp() ? "ipopt" : "sqp";
-  next.tolerance = spec.tolerance;
-  next.max_iterations = spec.max_iterations;
-  next.max_evaluations = spec.max_evaluations;
-  const NloptMethod* const method = find_nlopt_method(spec.type);
-  if ((result.status != SolverStatus::infeasible && !stalled) || spec.type == "sqp" || (method && method->global) ||
-      !take_off(result, next))
-    return result;
-  DesignOptions without_comparison = options;
-  without_comparison.compare_differences = false;
-  if (!spec.is_sqp())
-    for (std::size_t p = 0; p < again.scene.parameters.size(); ++p)
-      again.scene.parameters[p].value = result.rho(static_cast<Eigen::Index>(p));
-  DesignResult other = SingleDesign(again, without_comparison).run();
-  if (!other.ok() || (stalled && other.status != SolverStatus::converged)) {
-    result.iterations += other.iterations;
-    result.evaluations += other.evaluations;
-    result.failed_evaluations += other.failed_evaluations;
-    result.simulations += other.simulations;
-    result.wall_seconds += other.wall_seconds;
-    if (other.status == SolverStatus::stopped) result.end(other.status, other.message);
-    return result;
-  }
-  other.add_work_of(result);
-  other.prepend(std::move(result.history));
-  return other;
+  return Searches(problem, options).run();
 }
 
 }  // namespace mbsopt::inline optim
