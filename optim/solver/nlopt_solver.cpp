@@ -41,6 +41,7 @@ class NloptSearch : private NlpSearch {
         options_(options),
         wanted_(method.gradients ? Wanted::derivatives : Wanted::values),
         max_evaluations_(options.max_evaluations.value_or(default_max_evaluations(method, problem.variables()))) {
+    moves_to_best_ = !method.global;
     for (Index i = 0; i < problem.constraints(); ++i) {
       const double lower = problem.c_lower(i), upper = problem.c_upper(i);
       if (lower == upper) {

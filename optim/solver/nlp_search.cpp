@@ -95,6 +95,7 @@ void NlpSearch::keep_best(const NlpPoint& point) {
   if (is_best_) {
     best_x_ = x_;
     best_ = point;
+    if (moves_to_best_) problem_.moved_to(x_);
   }
 }
 

@@ -54,6 +54,9 @@ class NlpSearch {
   // The result becomes the solution. If there is none, it becomes the best point.
   void take_solution();
 
+  // Whether the problem is told of each best point: what the search tries next is near it.
+  bool moves_to_best_ = true;
+
   void end_refused();  // at the start
   // Takes the solution and judges it by feasibility and optimality alone, whichever method found it and however that
   // ended. why: the reason in words if it is not optimal.

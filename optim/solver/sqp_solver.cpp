@@ -37,7 +37,9 @@ class SqpSearch : private NlpSearch {
       : NlpSearch(problem, options, result),
         options_(options),
         radius_(options.first_radius),
-        rest_(problem.variables()) {}
+        rest_(problem.variables()) {
+    moves_to_best_ = false;  // but to each accepted point
+  }
 
   void run(const VectorXd& x_start) {
     result_.algorithm = "SQP: damped steps within linear limits";
