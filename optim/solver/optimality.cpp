@@ -79,6 +79,7 @@ void add_near(const NonlinearProgram& problem, const NlpPoint& point, Index i, s
 
 // The pieces of f that come near the largest of their extreme: y moves its weight from that one to them.
 void add_near_pieces(const NonlinearProgram& problem, const NlpPoint& point, std::vector<Multiplier>& found) {
+  constexpr double kSame = 1e-12;  // of the gradients: pieces that differ by rounding have no weight to exchange
   const NlpPiece* top = nullptr;
   for (const NlpPiece& piece : point.pieces) {
     if (piece.row >= 0) continue;
@@ -86,6 +87,7 @@ void add_near_pieces(const NonlinearProgram& problem, const NlpPoint& point, std
       top = &piece;
       continue;
     }
+    if ((piece.gradient - top->gradient).norm() <= kSame * top->gradient.norm()) continue;
     const double slack = problem.f_scale * std::abs(top->value - piece.value);
     if (slack <= kNear * std::max(1.0, problem.f_scale * std::abs(top->value)))
       found.push_back({piece.row, 1, slack, problem.f_scale * (piece.gradient - top->gradient)});
