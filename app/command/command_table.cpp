@@ -80,6 +80,7 @@ void gradient_options(CLI::App& sub, CommandOptions& options) {
 
 void design_options(CLI::App& sub, CommandOptions& options) {
   problem_options(sub, options);
+  sub.add_flag("--explain", options.explain, "say which searches were made and why, and how each ended");
   add_keep_journal(sub, options);
 }
 

@@ -38,6 +38,7 @@ struct CommandOptions {
   bool quiet = false;                // --quiet
   bool allow_plugins = false;        // --allow-plugins
   bool json = false;                 // --json: only result.json on standard output
+  bool explain = false;              // --explain of design: which searches were made and why
   bool keep_journal = false;         // --keep-journal of design, identify and sweep
   bool resume = false;               // continue with the journal in `out`
 };
