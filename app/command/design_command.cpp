@@ -32,6 +32,12 @@ void add_to_result(Json& result, const DesignResult& design) {
     objective["initial"] = c.initial;
     objective["weight"] = c.weight;
   }
+  for (const DesignCase& term : design.terms) {
+    Json& objective = result["objectives"][term.name];
+    objective = objective_json(term.value, term.true_value);
+    objective["initial"] = term.initial;
+    objective["weight"] = term.weight;
+  }
   for (const DesignConstraint& c : design.constraints) {
     Json& objectives = c.load_case.empty() ? result["objectives"] : result["cases"][c.load_case]["objectives"];
     Json& objective = objectives[c.objective];
@@ -67,11 +73,13 @@ void add_to_result(Json& result, const DesignResult& design) {
                {"optimality", design.optimality},
                {"infeasibility", design.violation},
                {"true_infeasibility", design.true_violation}};
+  if (design.maximises) optimizer["maximised"] = true;
   if (design.seed) optimizer["seed"] = *design.seed;
   if (design.status == SolverStatus::converged)
     optimizer["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
   if (design.mode && design.mode->of > 0) optimizer["assembly_mode"] = mode_json(*design.mode);
   if (design.closing_steps > 0) optimizer["closing_steps"] = design.closing_steps;
+  optimizer["decisions"] = design.decisions;
   for (const DesignConflict& c : design.conflicts)
     result["conflicts"].push_back({{"limit", c.limit}, {"missed", c.missed}, {"price", c.price}});
 }
@@ -131,7 +139,8 @@ void show_design(RunPage& page, const DesignResult& design, const std::string& e
         design.true_violation > design.violation ? fmt::format(", {:.1e} of true extremes", design.true_violation)
                                                  : "");
   if (std::ranges::any_of(design.constraints, [](const DesignConstraint& c) { return c.price != 0; }))
-    page.say(fmt::format("price: decrease of '{}' per unit by which the limit is relaxed", design.objective));
+    page.say(fmt::format("price: {} of '{}' per unit by which the limit is relaxed",
+                         design.maximises ? "increase" : "decrease", design.objective));
   if (design.conflicts.empty()) return;
   page.both(
       table_of(result.at("conflicts"), {{"limit in conflict", "limit"}, {"missed by", "missed"}, {"price", "price"}}));
@@ -269,13 +278,18 @@ int design_command(const CommandContext& context) {
   run.warn(model_warnings(mechanism, Assembly(mechanism, scene.simulation.start_time)));
 
   LongRun long_run(run);
-  const auto [design, cut_off] = minimised(long_run, before.psi);
+  const auto [design, cut_off] = minimised(long_run);
   add_to_result(run.result, design);
   const ObjectiveUnits units = objective_units(run.problem);
   add_units(run.result, units);
   show_design(page, design,
               run.problem.design->multistart ? effort(run, design.simulations, design.wall_seconds)
                                              : fmt::format("{:.3g} s", design.wall_seconds));
+  if (context.options.explain) {
+    context.out << "\ndecisions:\n";
+    if (!design.gradient_choice.empty()) context.out << fmt::format("- gradients by {}\n", design.gradient_choice);
+    for (const std::string& decision : design.decisions) context.out << fmt::format("- {}\n", decision);
+  }
   run.warn(design.warnings);
   run.warn(design.final_evaluation.warnings);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);

@@ -58,7 +58,8 @@ void add_objective(Sweep& sweep, const Problem& problem, const ObjectiveSpec& sp
   for (const Parameter* p : sweep.varied)
     if (gradients) columns.push_back("d " + spec.name + "/d " + p->name);
   if (problem.design) {
-    if (spec.name == problem.design->minimize) sweep.best_by = sweep.objectives.size();
+    if (spec.name == problem.design->minimize || spec.name == problem.design->maximize)
+      sweep.best_by = sweep.objectives.size();
     const auto bound = std::ranges::find(problem.design->subject_to, spec.name, &ObjectiveBound::objective);
     if (bound != problem.design->subject_to.end()) {
       o.lower = bound->lower;

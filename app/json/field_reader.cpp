@@ -165,7 +165,7 @@ class FieldReader {
   void reference_or(std::string_view key, std::string& value, ElementKind to, const FieldInfo& info, auto&& fields) {
     if (!has_object(key)) return reference(key, value, to, info);
     group(key, info, [&](FieldReader& inside) {
-      inside.reference(kObjectiveKey, value, to, {info.description, Need::required});
+      inside.reference(kObjectiveKey, value, to, {info.description});
       fields(inside);
     });
   }

@@ -70,7 +70,7 @@ class SchemaWriter {
   }
   void reference_or(std::string_view key, std::string& value, ElementKind to, const FieldInfo& info, auto&& fields) {
     SchemaWriter form;
-    form.reference(kObjectiveKey, value, to, {info.description, Need::required});
+    form.reference(kObjectiveKey, value, to, {"the objective to minimise"});
     fields(form);
     put(key, info, {{"anyOf", {{{"type", "string"}}, form.object()}}});
   }

@@ -91,8 +91,9 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
               {"evaluations", design.evaluations},
               {"simulations", design.simulations},
               {"wall_seconds", design.wall_seconds}};
+  if (design.maximises) record["maximised"] = true;
   if (design.status == SolverStatus::converged) record["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
-  if (design.mode) record["assembly_mode"] = mode_json(*design.mode);
+  if (design.mode && design.mode->of > 0) record["assembly_mode"] = mode_json(*design.mode);
   if (design.closing_steps > 0) record["closing_steps"] = design.closing_steps;
   for (const DesignVariable& v : design.variables) {
     record["from"][v.name] = v.initial;
@@ -123,39 +124,20 @@ DesignResult result_of_best(Run& run, const Problem& problem, DesignOptions opti
   return end;
 }
 
-void describe_given_cases(const Problem& problem, DesignResult& design) {
-  std::vector<std::string> objectives{design.objective};
-  for (const ObjectiveBound& bound : problem.design->subject_to) objectives.push_back(bound.objective);
-  Evaluator evaluator(problem, objectives, problem.design->variables);
-  const Evaluation given = evaluator.values(evaluator.start());
-  if (!given.ok) return;
-  Eigen::VectorXd minimised(static_cast<Eigen::Index>(problem.cases.size()));
-  auto constraint = design.constraints.begin();
-  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
-    const Eigen::VectorXd& psi = given.of_cases[c].psi;
-    design.cases[c].initial = minimised(static_cast<Eigen::Index>(c)) = psi(0);
-    for (Eigen::Index i = 1; i < psi.size(); ++i) (constraint++)->initial = psi(i);
-  }
-  design.objective_initial = CaseObjective(problem.cases, *problem.design).value(minimised);
-}
-
 // Describes the best run, but with the given problem before it.
-void describe_given(const Problem& problem, const Eigen::VectorXd& before, DesignResult& design) {
-  const std::vector<Parameter> parameters = parameters_of(problem.scene, problem.design->variables);
-  for (std::size_t k = 0; k < design.variables.size(); ++k) design.variables[k].initial = parameters[k].value;
-  if (!problem.cases.empty()) return describe_given_cases(problem, design);
-  const auto value_before = [&](const std::string& objective) {
-    for (std::size_t i = 0; i < problem.objectives.size(); ++i)
-      if (problem.objectives[i].name == objective) return before(static_cast<Eigen::Index>(i));
-    return std::nan("");
-  };
-  design.objective_initial = value_before(design.objective);
-  for (DesignConstraint& c : design.constraints) c.initial = value_before(c.objective);
+void describe_given(const Problem& problem, DesignResult& design) {
+  const DesignResult given = given_design(problem);
+  design.objective_initial = given.objective_initial;
+  for (std::size_t k = 0; k < design.variables.size(); ++k) design.variables[k].initial = given.variables[k].initial;
+  for (std::size_t i = 0; i < design.constraints.size(); ++i)
+    design.constraints[i].initial = given.constraints[i].initial;
+  for (std::size_t c = 0; c < design.cases.size(); ++c) design.cases[c].initial = given.cases[c].initial;
+  for (std::size_t k = 0; k < design.terms.size(); ++k) design.terms[k].initial = given.terms[k].initial;
 }
 
 // Describes a design that ended before its first evaluation.
-void describe_unmoved(const Problem& problem, const Eigen::VectorXd& before, DesignResult& design) {
-  describe_given(problem, before, design);
+void describe_unmoved(const Problem& problem, DesignResult& design) {
+  describe_given(problem, design);
   design.objective_final = design.objective_initial;
   for (DesignConstraint& c : design.constraints) c.value = c.initial;
   for (DesignCase& c : design.cases) c.value = c.initial;
@@ -170,7 +152,7 @@ Json task_of(const Problem& problem, const NlpScale& scale, const std::optional<
   return task;
 }
 
-DesignOutcome best_of_starts(LongRun& long_run, const Problem& seeded, const Eigen::VectorXd& before) {
+DesignOutcome best_of_starts(LongRun& long_run, const Problem& seeded) {
   DesignOptions until_interrupted;
   until_interrupted.simulation_progress = long_run.run.watched("simulating");
   Problem problem = seeded;
@@ -197,7 +179,7 @@ DesignOutcome best_of_starts(LongRun& long_run, const Problem& seeded, const Eig
     options.scale = scale;
     options.mode = mode_of(start, modes);
     result.design = result_of_best(long_run.run, from(start), options, *best);
-    describe_given(problem, before, result.design);
+    describe_given(problem, result.design);
   } else {
     result.design = run_design(from(0), until_interrupted);
   }
@@ -225,12 +207,12 @@ StartWork design_start_work(Problem problem, const Json& task) {
           }};
 }
 
-DesignOutcome minimised(LongRun& long_run, const Eigen::VectorXd& before) {
+DesignOutcome minimised(LongRun& long_run) {
   const Problem problem = with_seeds(long_run.run.problem, long_run);
   long_run.begin();
-  DesignOutcome outcome = problem.design->multistart ? best_of_starts(long_run, problem, before)
-                                                     : DesignOutcome{single_run(long_run, problem)};
-  if (outcome.design.evaluations == 0) describe_unmoved(problem, before, outcome.design);
+  DesignOutcome outcome =
+      problem.design->multistart ? best_of_starts(long_run, problem) : DesignOutcome{single_run(long_run, problem)};
+  if (outcome.design.evaluations == 0) describe_unmoved(problem, outcome.design);
   long_run.run.progress.finish();
   return outcome;
 }

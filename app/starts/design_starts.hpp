@@ -14,8 +14,7 @@ struct DesignOutcome {
   bool interrupted = false;  // before all starts had finished
 };
 
-// before holds the objectives at the given values, in the problem's order.
-DesignOutcome minimised(LongRun& long_run, const Eigen::VectorXd& before);
+DesignOutcome minimised(LongRun& long_run);
 
 // The starts of its multistart, from the task of this process or another one.
 StartWork design_start_work(Problem problem, const Json& task);

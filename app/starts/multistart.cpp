@@ -26,7 +26,8 @@ int number_of(const Json& record) { return record.at("start").get<int>(); }
 // A smaller rank is better.
 std::tuple<int, double, double, int> rank(const Json& record) {
   if (!has_objective(record)) return {2, 0, 0, number_of(record)};
-  const double violation = record.value("infeasibility", 0.0), objective = record["objective"].get<double>();
+  const double violation = record.value("infeasibility", 0.0),
+               objective = (record.value("maximised", false) ? -1 : 1) * record["objective"].get<double>();
   if (violation <= kFeasible) return {0, objective, 0, number_of(record)};
   return {1, violation, objective, number_of(record)};
 }

@@ -6,6 +6,7 @@
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/scene_error.hpp"
 #include "optim/design/closing.hpp"
+#include "optim/design/design_description.hpp"
 #include "optim/design/design_program.hpp"
 #include "optim/design/design_search.hpp"
 #include "optim/problem/parameter_values.hpp"
@@ -43,6 +44,13 @@ Problem closed(const Problem& given, const DesignOptions& options, int& steps) {
 
 std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options) {
   return DesignProgram(problem, options).spec().sharpness;
+}
+
+DesignResult given_design(const Problem& problem) {
+  DesignProgram program(problem);
+  DesignResult result;
+  describe_start(program, program.evaluator().values(program.evaluator().start()), result);
+  return result;
 }
 
 NlpScale design_scale(const Problem& problem, const DesignOptions& options) {

@@ -2,7 +2,7 @@
 //
 //   minimise psi_0(rho)   subject to   rho_lower <= rho <= rho_upper,   lower_i <= psi_i(rho) <= upper_i
 //
-// An extreme psi_i is smooth for the optimiser, but its limits hold for the true value (true_limits.hpp).
+// Limits on an extreme psi_i hold for its true value.
 //
 //   DesignOptions options;
 //   options.progress = [](const DesignRow& row) { std::cerr << row.objective << '\n'; return true; };
@@ -32,6 +32,9 @@ std::optional<double> design_sharpness(const Problem& problem, const DesignOptio
 // Counts the assembly modes at the start, from the problem's own values. Returns 0 if something is free or nothing
 // closes, and those found so far if it is abandoned.
 int design_modes(const Problem& problem, const DesignOptions& options = {});
+
+// The values of a problem before any search, in a result of a design.
+DesignResult given_design(const Problem& problem);
 
 // The scale that a run from the problem's own values would take.
 NlpScale design_scale(const Problem& problem, const DesignOptions& options = {});

@@ -77,20 +77,26 @@ void describe_conflict(const DesignProgram& program, const Eigen::VectorXd& x, c
 void describe_objective(const DesignProgram& program, const std::vector<std::optional<double>>& true_values,
                         DesignResult& result) {
   if (!result.final_evaluation.ok) return;
-  Eigen::VectorXd values = program.minimised(result.final_evaluation.psi);
-  const Eigen::Index stride = static_cast<Eigen::Index>(true_values.size()) / values.size();
-  bool smooth = program.objective().is_maximum();
-  for (Eigen::Index c = 0; c < values.size(); ++c) {
-    const std::optional<double>& true_value = true_values[static_cast<std::size_t>(c * stride)];
-    if (!result.cases.empty()) {
-      DesignCase& of_case = result.cases[static_cast<std::size_t>(c)];
-      of_case.value = values(c);
-      of_case.true_value = true_value;
-    }
+  const CaseObjective& objective = program.objective();
+  const double sign = program.spec().sign();
+  const std::vector<Eigen::Index> rows = program.minimised_rows();
+  const Eigen::VectorXd values = program.minimised(result.final_evaluation.psi);
+  Eigen::VectorXd true_ones = values;
+  bool smooth = false;
+  for (std::size_t j = 0; j < rows.size(); ++j) {
+    const std::optional<double>& true_value = true_values[static_cast<std::size_t>(rows[j])];
     smooth = smooth || true_value;
-    values(c) = true_value.value_or(values(c));
+    true_ones(static_cast<Eigen::Index>(j)) = true_value.value_or(values(static_cast<Eigen::Index>(j)));
   }
-  if (smooth) result.objective_true = program.objective().true_value(values);
+  for (std::size_t c = 0; c < result.cases.size(); ++c) {
+    result.cases[c].value = sign * objective.of_case(values, static_cast<Eigen::Index>(c));
+    if (smooth) result.cases[c].true_value = sign * objective.of_case(true_ones, static_cast<Eigen::Index>(c));
+  }
+  for (std::size_t k = 0; k < result.terms.size(); ++k) {
+    result.terms[k].value = values(static_cast<Eigen::Index>(k));
+    result.terms[k].true_value = true_values[static_cast<std::size_t>(rows[k])];
+  }
+  if (smooth || objective.is_maximum()) result.objective_true = sign * objective.true_value(true_ones);
 }
 
 // Least squares converges by its steps. A solved run has no noise, so that its end must also satisfy the optimality
@@ -152,16 +158,24 @@ void judge_true_extremes(const DesignProgram& program, DesignResult& result) {
 
 void describe_start(const DesignProgram& program, const Evaluation& start, DesignResult& result) {
   const std::vector<CaseSpec>& cases = program.problem().cases;
-  result.objective = program.spec().minimize;
+  const DesignSpec& spec = program.spec();
+  result.objective = spec.name();
+  result.maximises = spec.sign() < 0;
   for (const Parameter& p : program.designed())
     result.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});
+  const CaseObjective& objective = program.objective();
   const Eigen::VectorXd minimised =
-      start.ok ? program.minimised(start.psi) : Eigen::VectorXd::Zero(static_cast<Eigen::Index>(cases.size()));
-  if (start.ok) result.objective_initial = result.objective_final = program.objective().value(minimised);
+      start.ok ? program.minimised(start.psi) : Eigen::VectorXd::Zero(objective.weights().size());
+  if (start.ok) result.objective_initial = result.objective_final = spec.sign() * objective.value(minimised);
   for (std::size_t c = 0; c < cases.size(); ++c) {
-    const double value = minimised(static_cast<Eigen::Index>(c));
+    const double value = spec.sign() * objective.of_case(minimised, static_cast<Eigen::Index>(c));
     result.cases.push_back({cases[c].name, cases[c].weight, value, value});
   }
+  if (cases.empty() && spec.terms().size() > 1)
+    for (const WeightedObjective& term : spec.terms()) {
+      const double value = minimised(static_cast<Eigen::Index>(result.terms.size()));
+      result.terms.push_back({term.objective, term.weight, value, value});
+    }
   for (Eigen::Index i = 0; i < program.constraints(); ++i) {
     const ObjectiveBound& bound = program.bound(i);
     DesignConstraint& constraint = result.constraints.emplace_back();
@@ -172,7 +186,7 @@ void describe_start(const DesignProgram& program, const Evaluation& start, Desig
     constraint.load_case =
         program.evaluator().case_name(static_cast<std::size_t>(i) / program.spec().subject_to.size());
   }
-  if (start.ok) warn_of_idle_variables(start, program.spec(), result);
+  if (start.ok && start.has_gradients()) warn_of_idle_variables(start, spec, result);
 }
 
 void describe_end(const DesignProgram& program, const NlpResult& solution, DesignResult& result) {
@@ -186,7 +200,7 @@ void describe_end(const DesignProgram& program, const NlpResult& solution, Desig
     v.at_lower = touches(v.value, v.lower, size);
     v.at_upper = touches(v.value, v.upper, size);
   }
-  result.objective_final = end.f;
+  result.objective_final = program.spec().sign() * end.f;
   result.violation = result.true_violation = program.violation(end.c);
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];

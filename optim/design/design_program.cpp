@@ -85,7 +85,7 @@ EvaluatorOptions evaluator_options(const DesignSpec& spec, const DesignOptions& 
 // Whether Gauss-Newton's matrix tells more of the objective than nothing.
 bool sums_squares(const Problem& problem, const DesignSpec& spec, const Evaluator& evaluator) {
   if (!spec.optimizer.is_sqp() || is_cvodes(problem.scene.simulation.integrator.type)) return false;
-  if (spec.over == "max" && problem.cases.size() > 1) return false;
+  if (spec.minimize.empty() || (spec.over == "max" && problem.cases.size() > 1)) return false;
   for (std::size_t c = 0; c < evaluator.cases(); ++c) {
     const Objective& objective = evaluator.of_case(c).objectives()[0];
     if (objective.is_extreme() || objective.is_linear() || objective.is_eigenvalue() || objective.is_written_in_cpp() ||
@@ -96,7 +96,8 @@ bool sums_squares(const Problem& problem, const DesignSpec& spec, const Evaluato
 }
 
 std::vector<std::string> objective_names(const DesignSpec& spec) {
-  std::vector<std::string> names{spec.minimize};
+  std::vector<std::string> names;
+  for (const WeightedObjective& term : spec.terms()) names.push_back(term.objective);
   for (const ObjectiveBound& bound : spec.subject_to) names.push_back(bound.objective);
   return names;
 }
@@ -108,6 +109,7 @@ DesignProgram::DesignProgram(const Problem& problem, const DesignOptions& option
       evaluator_(problem_, objective_names(spec_), spec_.variables, evaluator_options(spec_, options)),
       scaling_(designed(), felt_changes()),
       x_start_(scaling_.to_x(evaluator_.start()(evaluator_.variables()))),
+      terms_(static_cast<Index>(spec_.terms().size())),
       bounds_(static_cast<Index>(spec_.subject_to.size())),
       abandoned_(std::move(abandoned)),
       has_squares_(sums_squares(problem_, spec_, evaluator_)),
@@ -115,8 +117,11 @@ DesignProgram::DesignProgram(const Problem& problem, const DesignOptions& option
   if (has_squares_) evaluator_.gather_curvature();
   x_lower = scaling_.x_lower();
   x_upper = scaling_.x_upper();
-  if (!spec_.sharpness && !spec_.optimizer.is_sqp()) spec_.sharpness = sharpness();
   objective_ = CaseObjective(problem_.cases, spec_);
+  if (!spec_.sharpness && !spec_.optimizer.is_sqp()) {
+    spec_.sharpness = sharpness();
+    objective_ = CaseObjective(problem_.cases, spec_);
+  }
   const Index m = bounds_ * static_cast<Index>(evaluator_.cases());
   c_lower.setConstant(m, -kInfinity);
   c_upper.setConstant(m, kInfinity);
@@ -174,36 +179,35 @@ VectorXd DesignProgram::felt_changes() {
   return felt;
 }
 
-// The sharpness of the maximum over cases is relative to the largest value at the start.
+// The sharpness of the maximum over cases and terms is relative to the largest value at the start.
 std::optional<double> DesignProgram::sharpness() {
-  if (spec_.over != "max" || problem_.cases.size() < 2) return std::nullopt;
+  if (!objective_.is_maximum()) return std::nullopt;
   const Evaluation start = evaluator_.gradients(evaluator_.start());
-  double largest = 0;
-  for (std::size_t c = 0; c < problem_.cases.size() && start.ok; ++c)
-    largest = std::max(largest, std::abs(problem_.cases[c].weight * start.of_cases[c].psi(0)));
+  const double largest = start.ok ? objective_.weights().cwiseProduct(minimised(start.psi)).cwiseAbs().maxCoeff() : 0;
   return DesignSpec::kSharpness / (largest > 0 ? largest : 1);
 }
 
-Index DesignProgram::row_of(std::size_t load_case) const { return static_cast<Index>(load_case) * (1 + bounds_); }
+std::vector<Index> DesignProgram::minimised_rows() const {
+  std::vector<Index> rows;
+  for (Index c = 0; c < static_cast<Index>(evaluator_.cases()); ++c)
+    for (Index k = 0; k < terms_; ++k) rows.push_back(c * (terms_ + bounds_) + k);
+  return rows;
+}
 Index DesignProgram::psi_of(Index constraint) const {
-  return row_of(static_cast<std::size_t>(constraint / bounds_)) + 1 + constraint % bounds_;
+  return constraint / bounds_ * (terms_ + bounds_) + terms_ + constraint % bounds_;
 }
 const Objective& DesignProgram::limited(Index constraint) const {
   return evaluator_.of_case(static_cast<std::size_t>(constraint / bounds_))
-      .objectives()[static_cast<std::size_t>(1 + constraint % bounds_)];
+      .objectives()[static_cast<std::size_t>(terms_ + constraint % bounds_)];
 }
 const ObjectiveBound& DesignProgram::bound(Index constraint) const {
   return spec_.subject_to[static_cast<std::size_t>(constraint % bounds_)];
 }
 
-VectorXd DesignProgram::minimised(const VectorXd& psi) const { return psi(Eigen::seq(0, psi.size() - 1, 1 + bounds_)); }
+VectorXd DesignProgram::minimised(const VectorXd& psi) const { return psi(minimised_rows()); }
 
 VectorXd DesignProgram::f_rho(const Evaluation& e) const {
-  const VectorXd slopes = objective_.gradient(minimised(e.psi));
-  VectorXd sum = VectorXd::Zero(e.psi_rho.cols());
-  for (std::size_t c = 0; c < evaluator_.cases(); ++c)
-    sum += slopes(static_cast<Index>(c)) * e.psi_rho.row(row_of(c)).transpose();
-  return sum;
+  return e.psi_rho(minimised_rows(), Eigen::all).transpose() * objective_.gradient(minimised(e.psi));
 }
 
 NlpScale DesignProgram::scale_at(const VectorXd& x_start) {
@@ -281,35 +285,38 @@ void DesignProgram::fill(const Evaluation& e, const VectorXd& x, NlpPoint& point
   best_violations_ = violations;
 }
 
-// A sum over cases has an extreme for each of them; their maximum has one, of the pieces of all.
+// A sum over cases and terms has an extreme for each of them; their maximum has one, of the pieces of all.
 void DesignProgram::add_pieces(const Evaluation& e, const VectorXd& rho_x, NlpPoint& point) const {
-  const Index stride = 1 + bounds_;
+  const Index stride = terms_ + bounds_;
   const bool is_maximum = objective_.is_true_maximum();
   const auto apart = [](Index c) { return 1e3 * static_cast<double>(c); };
   std::vector<NlpPiece> of_maximum;
-  std::vector<bool> has_pieces(evaluator_.cases(), false);
+  const std::vector<Index> rows = minimised_rows();
+  std::vector<bool> has_pieces(rows.size(), false);
   const VectorXd weights = is_maximum ? objective_.weights() : objective_.gradient(minimised(e.psi));
   for (const ExtremePiece& piece : e.pieces) {
     const Index c = piece.row / stride, k = piece.row % stride;
     const VectorXd gradient = piece.gradient.cwiseProduct(rho_x);
-    if (k > 0) {
-      const Index constraint = c * bounds_ + k - 1;
+    if (k >= terms_) {
+      const Index constraint = c * bounds_ + k - terms_;
       point.pieces.push_back(
           {constraint, piece.side, piece.value / size_(constraint), gradient / size_(constraint), piece.t});
       continue;
     }
-    has_pieces[static_cast<std::size_t>(c)] = true;
-    if (piece.side < 0) continue;  // the least of several: a search that lowers it sees one of them
-    const NlpPiece of_f{is_maximum ? NlpPiece::kObjective : NlpPiece::kObjective - c, 1, weights(c) * piece.value,
-                        weights(c) * gradient, piece.t + apart(c)};
+    const Index j = c * terms_ + k;
+    const double weight = weights(j);
+    if (piece.side * weight < 0) continue;  // the least of several: a search that lowers it sees one of them
+    has_pieces[static_cast<std::size_t>(j)] = true;
+    const NlpPiece of_f{is_maximum ? NlpPiece::kObjective : NlpPiece::kObjective - j, 1, weight * piece.value,
+                        weight * gradient, piece.t + apart(j)};
     (is_maximum ? of_maximum : point.pieces).push_back(of_f);
   }
   if (!is_maximum) return;
-  for (std::size_t c = 0; c < has_pieces.size(); ++c) {
-    const Index row = row_of(c), of_case = static_cast<Index>(c);
-    if (!has_pieces[c])
-      of_maximum.push_back({NlpPiece::kObjective, 1, weights(of_case) * e.psi(row),
-                            weights(of_case) * e.psi_rho.row(row).transpose().cwiseProduct(rho_x), apart(of_case)});
+  for (Index j = 0; j < weights.size(); ++j) {
+    const Index row = rows[static_cast<std::size_t>(j)];
+    if (!has_pieces[static_cast<std::size_t>(j)])
+      of_maximum.push_back({NlpPiece::kObjective, 1, weights(j) * e.psi(row),
+                            weights(j) * e.psi_rho.row(row).transpose().cwiseProduct(rho_x), apart(j)});
   }
   std::ranges::stable_sort(of_maximum, std::greater(), &NlpPiece::value);
   std::ranges::move(of_maximum, std::back_inserter(point.pieces));
@@ -363,10 +370,11 @@ bool DesignProgram::hessians(const VectorXd& x, std::vector<MatrixXd>& H) {
     H = {in_x(squares, f_rho(at))};
     return true;
   }
-  MatrixXd f_rhorho = slopes(0) * of_psi(0);
-  for (std::size_t c = 1; c < evaluator_.cases(); ++c) f_rhorho += slopes(static_cast<Index>(c)) * of_psi(row_of(c));
+  const std::vector<Index> rows = minimised_rows();
+  MatrixXd f_rhorho = MatrixXd::Zero(x.size(), x.size());
+  for (Index j = 0; j < slopes.size(); ++j) f_rhorho += slopes(j) * of_psi(rows[static_cast<std::size_t>(j)]);
   if (objective_.is_maximum()) {
-    const MatrixXd psi_rho = at.psi_rho(Eigen::seq(0, at.psi.size() - 1, 1 + bounds_), Eigen::all);
+    const MatrixXd psi_rho = at.psi_rho(rows, Eigen::all);
     f_rhorho += psi_rho.transpose() * objective_.hessian(psi) * psi_rho;
   }
   H = {in_x(f_rhorho, f_rho(at))};

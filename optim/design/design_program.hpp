@@ -60,8 +60,9 @@ class DesignProgram : public NonlinearProgram {
   const ObjectiveBound& bound(Eigen::Index constraint) const;
   double size(Eigen::Index constraint) const { return size_(constraint); }
   Eigen::Index psi_of(Eigen::Index constraint) const;
-  // The values that are minimised, one of each case.
+  // The values that are minimised: those of all terms in each case, and their rows in an evaluation.
   Eigen::VectorXd minimised(const Eigen::VectorXd& psi) const;
+  std::vector<Eigen::Index> minimised_rows() const;
   long hessian_gradients() const { return hessian_gradients_; }            // that second derivatives took
   const std::string& hessian_failure() const { return hessian_failure_; }  // the first, in words
 
@@ -73,7 +74,6 @@ class DesignProgram : public NonlinearProgram {
   void fill(const Evaluation& e, const Eigen::VectorXd& x, NlpPoint& point);
   void add_pieces(const Evaluation& e, const Eigen::VectorXd& rho_x, NlpPoint& point) const;
   double violations_of(const Evaluation& e) const;
-  Eigen::Index row_of(std::size_t load_case) const;  // in an evaluation, of the objective that is minimised
   Eigen::VectorXd f_rho(const Evaluation& e) const;
 
   const Problem problem_;
@@ -82,7 +82,7 @@ class DesignProgram : public NonlinearProgram {
   const VariableScaling scaling_;
   const Eigen::VectorXd x_start_;
   CaseObjective objective_;
-  const Eigen::Index bounds_;  // of each case
+  const Eigen::Index terms_, bounds_;  // of each case
   const std::function<bool()> abandoned_;
   NlpScale scale_;
   Eigen::VectorXd size_;  // of each constraint's bounds
@@ -93,7 +93,8 @@ class DesignProgram : public NonlinearProgram {
   const bool has_squares_, gauss_newton_;
 };
 
-std::vector<std::string> objective_names(const DesignSpec& spec);  // what is minimised, then what is bounded
+std::vector<std::string> objective_names(
+    const DesignSpec& spec);  // the terms of what is minimised, then what is bounded
 
 inline constexpr double kConstraintTolerance = 1e-8;  // relative to the size of the bounds: what counts as held
 

@@ -25,6 +25,7 @@ void DesignResult::follow(DesignResult earlier) {
   for (std::size_t v = 0; v < variables.size(); ++v) variables[v].initial = earlier.variables[v].initial;
   for (std::size_t c = 0; c < constraints.size(); ++c) constraints[c].initial = earlier.constraints[c].initial;
   for (std::size_t c = 0; c < cases.size(); ++c) cases[c].initial = earlier.cases[c].initial;
+  for (std::size_t k = 0; k < terms.size(); ++k) terms[k].initial = earlier.terms[k].initial;
   std::vector<DesignRow> rows = std::move(earlier.history);
   const int before = rows.empty() ? 0 : rows.back().iteration;
   for (DesignRow& row : history) {

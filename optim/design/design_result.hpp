@@ -36,7 +36,7 @@ struct DesignConstraint {
   std::string in_words() const;  // "peak", "peak (cold)"
 };
 
-// The minimised objective in one load case.
+// What is minimised in one load case; or a term of it.
 struct DesignCase {
   std::string name;
   double weight = 1, initial = 0, value = 0;
@@ -69,11 +69,13 @@ struct DesignRow {
 // x: the scaled variables at the solution.
 struct DesignResult : SolverOutcome {
   std::string objective;
+  bool maximises = false;
   double objective_initial = 0, objective_final = 0;
   std::optional<double> objective_true;  // at the solution, where it is a smooth extreme, or a smooth maximum of cases
   std::vector<DesignVariable> variables;
   std::vector<DesignConstraint> constraints;  // of all load cases
   std::vector<DesignCase> cases;              // where the problem has some
+  std::vector<DesignCase> terms;              // of a sum or a largest one, where it has none
   std::vector<DesignConflict> conflicts;      // where the limits cannot all hold
   std::vector<DesignRow> history;
   Eigen::VectorXd rho;          // all parameters at the solution, or at the best point where there is none
@@ -89,11 +91,13 @@ struct DesignResult : SolverOutcome {
   std::string gradient_choice;  // method and why
   long simulations = 0;         // also those of second derivatives
   double wall_seconds = 0;
-  std::vector<std::string> warnings;  // sentences
-  std::optional<DesignMode> mode;     // where one was asked for, or the poses of the scene do not lead to the end's
-  int closing_steps = 0;              // that led a start which does not close to one that does (closing.hpp)
+  std::vector<std::string> warnings;   // sentences
+  std::vector<std::string> decisions;  // sentences: which searches were made and why, how each ended
+  std::optional<DesignMode> mode;      // where one was asked for, or the poses of the scene do not lead to the end's
+  int closing_steps = 0;               // that led a start which does not close to one that does (closing.hpp)
   // The objective and the violation of limits that count: those with true extremes where there are some.
-  double reached() const { return objective_true.value_or(objective_final); }
+  // The less, the better.
+  double reached() const { return (maximises ? -1 : 1) * objective_true.value_or(objective_final); }
   double missed() const { return final_evaluation.ok ? true_violation : violation; }
   void add_counts(const DesignResult& of);
   // Adds the work of an earlier search, and starts where that one did.

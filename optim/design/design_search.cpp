@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "core/expression/counted.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "optim/design/chosen_solver.hpp"
 #include "optim/design/closing.hpp"
@@ -78,6 +79,18 @@ class SingleDesign {
   SingleDesign(const Problem& problem, const DesignOptions& options)
       : options_(options), program_(problem, until_abandoned(), [this] { return abandoned_.load(); }) {}
 
+  // What the optimiser is given, in words.
+  std::string description() const {
+    const OptimizerSpec& spec = program_.spec().optimizer;
+    std::string words = fmt::format("{} on {}", spec.chosen(), counted(program_.variables(), "variable"));
+    if (program_.constraints() > 0) words += " within " + counted(program_.constraints(), "limit");
+    if (program_.has_squares()) words += ", curvature of squares by Gauss-Newton";
+    if (smooths())
+      words += ", smooth extremes";
+    else if (std::ranges::any_of(program_.evaluator().objectives(), &Objective::is_extreme))
+      words += ", extremes peak by peak";
+    return words;
+  }
   const std::vector<std::string>& doubts() const { return doubts_; }  // about derivatives at the start
   // Whether the optimiser sees smooth extremes in place of true ones.
   bool smooths() const {
@@ -123,8 +136,8 @@ class SingleDesign {
   void search() {
     const auto progress = [this](const NlpProgress& p) {
       if (abandoned_) return false;  // the iterate before the one that was not reached
-      result_.history.push_back({p.iteration, p.f, p.violation, p.optimality, program_.scaling().to_rho(p.x),
-                                 result_.simulations + simulations()});
+      result_.history.push_back({p.iteration, program_.spec().sign() * p.f, p.violation, p.optimality,
+                                 program_.scaling().to_rho(p.x), result_.simulations + simulations()});
       return !options_.progress || options_.progress(result_.history.back());
     };
     solution_ = solve(program_, progress, result_);
@@ -211,8 +224,9 @@ class Searches {
   DesignResult run() {
     SingleDesign first(problem_, options_);
     best_ = first.run();
+    note(first, "from the start", best_);
     const OptimizerSpec& spec = problem_.design->optimizer;
-    if (spec.type == "sqp" || !best_.final_evaluation.ok) return std::move(best_);
+    if (spec.type == "sqp" || !best_.final_evaluation.ok) return ended();
     options_.compare_differences = false;
     doubts_ = first.doubts();
     const NloptMethod* const method = find_nlopt_method(spec.type);
@@ -223,10 +237,20 @@ class Searches {
     } else if (first.smooths() || (!is_global && is_stuck())) {
       go_on_with_sqp();
     }
-    return std::move(best_);
+    return ended();
   }
 
  private:
+  DesignResult ended() {
+    best_.decisions = std::move(decisions_);
+    return std::move(best_);
+  }
+  void note(const SingleDesign& search, const char* from, const DesignResult& end) {
+    decisions_.push_back(fmt::format("{}, {}: {} after {}, objective {:.7g}. {}", search.description(), from,
+                                     to_string(end.status), counted(end.evaluations, "evaluation"),
+                                     end.objective_true.value_or(end.objective_final), end.message));
+  }
+
   bool is_stuck() const {
     return best_.status == SolverStatus::no_progress || best_.status == SolverStatus::infeasible;
   }
@@ -236,13 +260,12 @@ class Searches {
   }
 
   void go_on_with_ipopt() {
-    if (std::optional<SingleDesign> search = prepared(problem_, "ipopt", options_)) {
-      const bool smooths = search->smooths();
-      if (take(search->run()) && smooths) go_on_with_sqp();
-    }
+    if (std::optional<SingleDesign> search = prepared(problem_, "ipopt", options_))
+      if (take(*search, "from the start, as it may find another valley") && search->smooths()) go_on_with_sqp();
   }
   void go_on_with_sqp() {
-    if (std::optional<SingleDesign> search = prepared(continued(best_), "sqp", options_)) take(search->run());
+    if (std::optional<SingleDesign> search = prepared(continued(best_), "sqp", options_))
+      take(*search, "from that end");
   }
   void go_round_dead_points(const std::vector<double>& instants) {
     DesignOptions without_scale = options_;  // which has no place for the distances
@@ -250,10 +273,12 @@ class Searches {
     std::optional<SingleDesign> search = prepared(away_from_dead_points(problem_, instants), "sqp", without_scale);
     if (!search) return;
     const DesignResult guarded = search->run();
+    note(*search, "from the start, with a distance from dead points", guarded);
     best_.add_counts(guarded);
     if (guarded.status == SolverStatus::stopped) return best_.end(guarded.status, guarded.message);
     if (!guarded.final_evaluation.ok) return;
-    if (std::optional<SingleDesign> last = prepared(continued(guarded), "sqp", options_)) take(last->run());
+    if (std::optional<SingleDesign> last = prepared(continued(guarded), "sqp", options_))
+      take(*last, "from that end, without the distance");
   }
 
   // The problem from the end of a search, in its poses.
@@ -280,14 +305,18 @@ class Searches {
     return std::optional<SingleDesign>(std::in_place, problem, options);
   }
 
-  // Keeps the better one. Returns whether that is the other.
-  bool take(DesignResult other) {
+  // Runs a search and keeps the better end. Returns whether that is its own.
+  bool take(SingleDesign& search, const char* from) {
+    DesignResult other = search.run();
+    note(search, from, other);
     if (!is_better_than_best(other)) {
       best_.add_counts(other);
       if (other.status == SolverStatus::stopped) best_.end(other.status, other.message);
       return false;
     }
     if (!other.mode && best_.mode) other.mode = best_.mode;
+    if (other.status != SolverStatus::converged)
+      other.message += fmt::format("; {} before: {}", best_.optimizer, best_.message);
     other.warnings.insert(other.warnings.begin(), doubts_.begin(), doubts_.end());
     other.follow(std::move(best_));
     best_ = std::move(other);
@@ -303,7 +332,7 @@ class Searches {
 
   const Problem& problem_;
   DesignOptions options_;
-  std::vector<std::string> doubts_;
+  std::vector<std::string> doubts_, decisions_;
   DesignResult best_;
 };
 

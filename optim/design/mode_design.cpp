@@ -20,7 +20,7 @@ Mechanism without_derivatives(const Scene& scene, const Eigen::VectorXd& rho) {
 // The start of a design that was not begun.
 DesignResult not_begun(const Problem& problem) {
   DesignResult none;
-  none.objective = problem.design->minimize;
+  none.objective = problem.design->name();
   none.optimizer = problem.design->optimizer.chosen();
   for (const std::string& name : problem.design->variables) {
     const Parameter& p = *std::ranges::find(problem.scene.parameters, name, &Parameter::name);

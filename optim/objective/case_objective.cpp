@@ -1,5 +1,6 @@
 #include "optim/objective/case_objective.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace mbsopt::inline optim {
@@ -8,9 +9,19 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 CaseObjective::CaseObjective(const std::vector<CaseSpec>& cases, const DesignSpec& design)
-    : w_(VectorXd::Ones(cases.empty() ? 1 : static_cast<Eigen::Index>(cases.size()))) {
-  for (std::size_t c = 0; c < cases.size(); ++c) w_(static_cast<Eigen::Index>(c)) = cases[c].weight;
-  if (cases.size() > 1 && design.over == "max") k_ = design.sharpness.value_or(INFINITY);
+    : takes_largest_(!design.largest_of.empty()) {
+  const std::vector<WeightedObjective> terms = design.terms();
+  const Eigen::Index n = static_cast<Eigen::Index>(terms.size());
+  a_.resize(n);
+  for (Eigen::Index k = 0; k < n; ++k) a_(k) = terms[static_cast<std::size_t>(k)].weight;
+  w_ = a_.replicate(std::max<Eigen::Index>(1, static_cast<Eigen::Index>(cases.size())), 1);
+  for (std::size_t c = 0; c < cases.size(); ++c) w_.segment(static_cast<Eigen::Index>(c) * n, n) *= cases[c].weight;
+  if (takes_largest_ || (cases.size() > 1 && design.over == "max")) k_ = design.sharpness.value_or(INFINITY);
+}
+
+double CaseObjective::of_case(const VectorXd& psi, Eigen::Index load_case) const {
+  const VectorXd x = a_.cwiseProduct(psi.segment(load_case * a_.size(), a_.size()));
+  return takes_largest_ ? x.maxCoeff() : x.sum();
 }
 
 // exp(k (x_c - largest)), divided by their sum

@@ -1,8 +1,9 @@
-// The function of a design over its load cases, from the values psi_c of its objective in them:
+// The function of a design over its terms and load cases, from their values psi_c, term by term in each case. w_c: the
+// weight of the term, times that of the case.
 //
-//   sum   f = sum of w_c psi_c
-//   max   f = (1/k) log( sum of exp(k w_c psi_c) )      above the largest w_c psi_c by log(cases)/k at most,
-//         or the largest itself, if the design gives no sharpness k
+//   sum      f = sum of w_c psi_c
+//   maximum  f = (1/k) log( sum of exp(k w_c psi_c) )      above the largest w_c psi_c by log(their number)/k at most,
+//            or the largest itself, if the design gives no sharpness k
 #pragma once
 
 #include <Eigen/Core>
@@ -25,12 +26,15 @@ class CaseObjective {
   bool is_maximum() const { return k_ > 0; }
   bool is_true_maximum() const { return std::isinf(k_); }
   const Eigen::VectorXd& weights() const { return w_; }
+  // Of one load case, without its weight.
+  double of_case(const Eigen::VectorXd& psi, Eigen::Index load_case) const;
 
  private:
   Eigen::VectorXd shares(const Eigen::VectorXd& weighted) const;
 
-  Eigen::VectorXd w_;
-  double k_ = 0;  // 0: a sum; infinite: the true maximum
+  Eigen::VectorXd a_, w_;       // weights of the terms; of all values
+  double k_ = 0;                // 0: a sum; infinite: the true maximum
+  bool takes_largest_ = false;  // of the terms
 };
 
 }  // namespace mbsopt::inline optim

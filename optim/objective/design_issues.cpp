@@ -132,11 +132,15 @@ std::optional<SceneIssue> curvature_issue(const Problem& problem) {
   if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares)
     if (const std::optional<SceneIssue> issue = limit_of_squares_issue(problem)) return issue;
   if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares &&
-      !objectives_of(problem, {problem.design->minimize}).front().is_sum_of_squares())
-    return SceneIssue{"design.optimizer.type", "is 'least_squares', but '" + problem.design->minimize +
+      (problem.design->minimize.empty() ||
+       !objectives_of(problem, {problem.design->minimize}).front().is_sum_of_squares()))
+    return SceneIssue{"design.optimizer.type", "is 'least_squares', but '" + problem.design->name() +
                                                    "' is not a sum of squares: it may have `track` alone; take ipopt"};
   if (!problem.design || problem.design->optimizer.hessian != "gauss_newton") return std::nullopt;
   const std::string& name = problem.design->minimize;
+  if (name.empty())
+    return SceneIssue{"design.optimizer.hessian",
+                      "is 'gauss_newton', which is for one objective that is minimised: take 'lbfgs' or 'exact'"};
   const Objective objective = objectives_of(problem, {name}).front();
   if (objective.free_instants())
     return SceneIssue{"design.optimizer.hessian", "is 'gauss_newton', but '" + name +

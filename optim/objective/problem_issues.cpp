@@ -155,6 +155,20 @@ void check_meaning(Checker& checker, const ObjectiveBound& bound) {
 }
 
 void check_meaning(Checker& checker, const DesignSpec& design) {
+  const int forms =
+      !design.minimize.empty() + !design.maximize.empty() + !design.sum.empty() + !design.largest_of.empty();
+  if (forms == 0)
+    checker.issue(checker.path("minimize"), "is missing; expected: the objective to minimise, or \"maximize\"");
+  if (forms > 1)
+    checker.issue(checker.path("minimize"),
+                  "is more than one of an objective, \"sum\", \"largest_of\" and \"maximize\"; give one of them");
+  for (std::size_t i = 0; i < design.sum.size(); ++i) {
+    const WeightedObjective& term = design.sum[i];
+    const std::string place = child_path(checker.path("minimize") + ".sum", i);
+    if (term.objective.empty() == !given_kind(term.means))
+      checker.issue(place, "must have an \"objective\" or a mean such as \"maximum_of\", and not both");
+    if (term.weight == 0) checker.issue(place + ".weight", "is 0: this part has no effect");
+  }
   for (const SceneIssue& found : optimizer_issues(design, checker.facts().scene()))
     checker.issue(found.path, found.message);
   std::map<std::string, std::size_t> first;

@@ -48,10 +48,25 @@ void name_sampled(Problem& problem) {
 void name_bounded_means(Problem& problem) {
   if (!problem.design) return;
   name_sampled(problem);
+  for (WeightedObjective& term : problem.design->sum) {
+    if (!given_kind(term.means)) continue;
+    term.objective = name_of_mean(term.means);
+    if (std::ranges::count(problem.objectives, term.objective, &ObjectiveSpec::name) == 0) {
+      ObjectiveSpec& objective = problem.objectives.emplace_back();
+      objective.name = term.objective;
+      objective.means = term.means;
+    }
+    term.means = {};
+  }
   for (ObjectiveBound& bound : problem.design->subject_to) {
     if (!given_kind(bound.means)) continue;
     ObjectiveSpec objective;
     objective.name = bound.objective = name_of_mean(bound.means);
+    if (const auto same = std::ranges::find(problem.objectives, objective.name, &ObjectiveSpec::name);
+        same != problem.objectives.end()) {  // of a sum that is minimised
+      bound.means = {};
+      continue;
+    }
     objective.means = bound.means;
     const double size = std::max(std::abs(bound.lower.value_or(0)), std::abs(bound.upper.value_or(0)));
     if (objective.is_extreme())

@@ -1,4 +1,5 @@
-// Limits on a mean of an expression, or on its values at instants, without an objective in the file:
+// Limits on a mean of an expression, or on its values at instants, and parts of a sum that is minimised, without an
+// objective in the file:
 //
 //   "subject_to": [{"maximum_of": "F", "upper": 33}, {"sampled": "sin(mu)", "every": 0.5, "lower": 0.1}]
 //

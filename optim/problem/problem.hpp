@@ -136,8 +136,18 @@ struct CaseSpec {
   std::optional<double> end_time = {};
 };
 
+// A part of a sum that is minimised: a named objective, or a mean of an expression (bounded_means.hpp).
+struct WeightedObjective {
+  std::string objective;
+  double weight = 1;
+  Means means = {};
+};
+
 struct DesignSpec {
-  std::string minimize;
+  std::string minimize;                      // an objective; or, with minimize empty, one of the next three
+  std::string maximize = {};                 // an objective
+  std::vector<WeightedObjective> sum;        // that is minimised
+  std::vector<std::string> largest_of;       // the largest of these objectives is minimised
   std::string over = "sum";                  // of load cases; or "max", smooth
   std::optional<double> sharpness = {};      // of this maximum [1/unit of the objective]
   static constexpr double kSharpness = 100;  // when absent: this over the largest value at the start
@@ -145,6 +155,12 @@ struct DesignSpec {
   std::vector<std::string> variables;  // parameter names
   OptimizerSpec optimizer;
   std::optional<MultistartSpec> multistart;
+
+  // What is minimised: the weighted sum, or the largest, of these. To maximise f is to minimise -f.
+  std::vector<WeightedObjective> terms() const;
+  double sign() const { return maximize.empty() ? 1 : -1; }
+  std::string name() const;  // of what is sought: "comfort", "mass + 0.01 travel", "largest of a, b"
+  bool uses(const std::string& objective) const;
 };
 
 // A channel's sigma is given (none), estimated in each experiment (own), or estimated for all channels of its column

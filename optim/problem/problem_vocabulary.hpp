@@ -91,6 +91,13 @@ void describe(auto& v, Like<ObjectiveBound> auto& b) {
   v.plain("upper", b.upper, kAny, {"it must not be more"});
 }
 
+void describe(auto& v, Like<WeightedObjective> auto& w) {
+  v.reference("objective", w.objective, ElementKind::objective,
+              {"a part of the sum; or, in its place, one of maximum_of, minimum_of, peak_to_peak_of and rms_of"});
+  describe_means(v, w.means);
+  v.plain("weight", w.weight, kAny, {"its factor"});
+}
+
 void describe(auto& v, Like<OptimizerSpec> auto& o) {
   static const std::string methods =
       "chosen from the problem (auto, the default); sequential quadratic programming (sqp); interior points (ipopt); "
@@ -146,13 +153,17 @@ void describe(auto& v, Like<CaseSpec> auto& c) {
 
 void describe(auto& v, Like<DesignSpec> auto& d) {
   v.reference_or("minimize", d.minimize, ElementKind::objective,
-                 {"the objective to minimise; to maximise f, one that is -f", Need::required}, [&](auto& inside) {
+                 {"the objective to minimise, a weighted sum, or the largest of several"}, [&](auto& inside) {
+                   inside.list("sum", d.sum, {"in place of objective: the weighted sum of these"});
+                   inside.references("largest_of", d.largest_of, ElementKind::objective,
+                                     {"in place of objective: the largest of these"});
                    inside.word("over", d.over, Words{"sum max"},
                                {"sum or maximum of its weighted values in the load cases"});
                    inside.plain("sharpness", d.sharpness, kPositive,
                                 {"of max: k in log(sum exp(k x))/k [1/unit of the objective]; when absent the true "
                                  "maximum by sqp, else 100 over the largest at the start"});
                  });
+  v.reference("maximize", d.maximize, ElementKind::objective, {"in place of minimize: the objective to maximise"});
   v.list("subject_to", d.subject_to, {"bounds on objectives; those of extremes hold for the true ones"});
   v.references("variables", d.variables, ElementKind::parameter, {"parameters that may change", Need::required});
   v.object("optimizer", d.optimizer, {"how it is minimised"});

@@ -223,11 +223,8 @@ std::set<std::string> used_in(const Problem& problem) {
 // The problem with only those objectives that its design uses.
 Problem as_designed(Problem problem) {
   problem.identification.reset();
-  std::erase_if(problem.objectives, [&](const ObjectiveSpec& objective) {
-    const auto& bounds = problem.design->subject_to;
-    return objective.name != problem.design->minimize &&
-           std::ranges::find(bounds, objective.name, &ObjectiveBound::objective) == bounds.end();
-  });
+  std::erase_if(problem.objectives,
+                [&](const ObjectiveSpec& objective) { return !problem.design->uses(objective.name); });
   return problem;
 }
 

@@ -95,10 +95,7 @@ Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quan
 TaskAdviser::TaskAdviser(const Problem& problem, const Tradeoff& tradeoff, const FitErrors* fit, double seconds)
     : tradeoff_(tradeoff), fit_(fit), seconds_(seconds), quantities_(main_quantities(tradeoff.quantities())) {
   if (!problem.design) return;
-  const auto is_followed = [&](const Quantity& q) {
-    return q.objective_name == problem.design->minimize ||
-           std::ranges::count(problem.design->subject_to, q.objective_name, &ObjectiveBound::objective) > 0;
-  };
+  const auto is_followed = [&](const Quantity& q) { return problem.design->uses(q.objective_name); };
   const std::vector<Quantity>& all = tradeoff.quantities();
   std::ptrdiff_t missing = 0;
   for (std::size_t q = 0; q < all.size(); ++q) {

@@ -152,7 +152,7 @@ const Case kCases[] = {
      "a unit stands in brackets: [kg]"},
     {"unit joined to its number", R"("free_length": 0.5)", R"("free_length": "1@kg")", "forces[0].free_length",
      "a unit stands in brackets: [kg]"},
-    {"maximise", R"("minimize": )", R"(@"maximize": )", "design.maximize", "unknown key; known here: minimize"},
+    {"maximise", R"("minimize": )", R"(@"maximise": )", "design.maximise", "did you mean 'maximize'?"},
     {"unknown unit", R"("free_length": 0.5)", R"("free_length": "1 [@furlong]")", "forces[0].free_length",
      "not a known unit"},
     {"bound of another dimension", R"("lower": 1, )", R"("lower": @"1 [m]", )", "parameters.k1.lower",
