@@ -310,12 +310,21 @@ bool DrivenRun::hides_a_peak(double h) {
   return false;
 }
 
-// The value of a term, which is NaN if it has no limit at a singular position.
 double DrivenRun::value_of(const DrivenTerm& term, const StatePoint& at) {
   const double g = term.cost->value(at);
-  if (is_left_out(g, at.t))
-    singular_at(at.t).note("objective '" + costs_[static_cast<std::size_t>(term.objective)].name + "'");
+  note_left_out(term, g, at.t);
   return g;
+}
+
+void DrivenRun::note_left_out(const DrivenTerm& term, double value, double t) {
+  if (is_left_out(value, t))
+    singular_at(t).note("objective '" + costs_[static_cast<std::size_t>(term.objective)].name + "'");
+}
+
+void DrivenRun::count(const DrivenTerm& term, double value, double t) {
+  if (!term.counts) return;
+  note_left_out(term, value, t);
+  result_.psi(term.objective) += value;
 }
 
 SingularPosition& DrivenRun::singular_at(double t) {
@@ -371,7 +380,7 @@ bool DrivenRun::take_events_until(double t, std::span<const SampleEvent>& events
     at_instant_.clear();
     for (; !events.empty() && events.front().time == time; events = events.subspan(1)) {
       const SampleEvent& e = events.front();
-      at_instant_.push_back({e.cost, e.objective, 1, e.index});
+      at_instant_.push_back({e.cost, e.objective, 1, e.index, true});
     }
     if (!take_here(at_instant_, take)) return false;
   }
@@ -381,17 +390,18 @@ bool DrivenRun::take_events_until(double t, std::span<const SampleEvent>& events
 bool DrivenRun::take_here(std::span<const DrivenTerm> terms, const Take& take) {
   note_uncertain();
   for (const DrivenTerm& term : terms) {
-    if (term.cost)
-      result_.psi(term.objective) += value_of(term, point());
-    else if (window_at(point().t) && continued_)
+    if (term.cost) {
+      if (!differentiated_) count(term, term.cost->value(point()), point().t);
+    } else if (window_at(point().t) && continued_) {
       for (const std::string& name : lacking_sensors(mechanism_, point())) singular_at(point().t).note(name);
+    }
   }
   return take(point(), terms);
 }
 
 bool DrivenRun::take_terminal_costs(const Take& take) {
   for (std::size_t o = 0; o < costs_.size(); ++o) {
-    const DrivenTerm term{costs_[o].terminal.get(), static_cast<Eigen::Index>(o), 1, 0};
+    const DrivenTerm term{costs_[o].terminal.get(), static_cast<Eigen::Index>(o), 1, 0, true};
     if (term.cost && !take_here(std::span(&term, 1), take)) return false;
   }
   return true;

@@ -38,6 +38,7 @@ struct DrivenTerm {
   Eigen::Index objective = 0;
   double weight = 1;
   std::size_t observation = 0;
+  bool counts = false;  // its value is a part of psi; those of a panel are in its integrals
 };
 
 class DrivenRun {
@@ -50,9 +51,11 @@ class DrivenRun {
             std::span<const double> observed, const RunOptions& options, const Assembly& start, bool differentiated,
             MotionSource* motion = nullptr);
 
-  // Computes psi of the result, and calls take at every instant.
+  // Computes psi of the result, and calls take at every instant. In runs with derivatives, take counts the values.
   void go(const Take& take);
   SimulationResult& result() { return result_; }
+  // Adds the value of a term that counts; it is NaN if it has no limit at a singular position.
+  void count(const DrivenTerm& term, double value, double t);
   SimulationResult finish();
   StatePoint point() { return point_of(path_.state()); }
   Projector& projector() { return path_.projector(); }
@@ -87,6 +90,7 @@ class DrivenRun {
   void stop_where_it_ends();  // with the reason why the path cannot continue
   StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, continued()}; }
   double value_of(const DrivenTerm& term, const StatePoint& at);
+  void note_left_out(const DrivenTerm& term, double value, double t);
   void note_uncertain();
   bool is_left_out(double g, double t) const { return std::isnan(g) && window_at(t); }
 

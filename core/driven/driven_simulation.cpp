@@ -87,7 +87,7 @@ class DrivenDerivatives {
   void add_forward(const DrivenTerm& term, const StatePoint& at, Eigen::MatrixXd& psi_rho) {
     y_bar_.setZero();
     rho_bar_.setZero();
-    term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
+    run_.count(term, term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_), at.t);
     psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
   }
   // Adds the same for all terms of one objective, to the gradients in the fields and parameters.
@@ -97,7 +97,8 @@ class DrivenDerivatives {
     ContinuedMotion* const motion = run_.continued();
     if (w && motion) motion->y_bars.assign(SingularWindow::kNodes, Eigen::VectorXd::Zero(y_bar_.size()));
     y_bar_.setZero();
-    for (const DrivenTerm& term : terms) term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
+    for (const DrivenTerm& term : terms)
+      run_.count(term, term.cost->add_gradient(at, term.weight, y_bar_, rho_bar), at.t);
     if (!w) return projector_.add_adjoint(y_bar_, y0_bar_, theta_bar, rho_bar);
     std::size_t k = 0;
     w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
@@ -135,6 +136,13 @@ class DrivenDerivatives {
   Eigen::MatrixXd y_rho_;
   LaneRows y0_dir_, direction_;  // y0_dir_ is zero: the projected state does not depend on rho
 };
+
+bool reads_positions(std::span<const Cost> costs) {
+  const auto reads = [](const std::shared_ptr<const PointCost>& cost) { return !cost || cost->reads_positions(); };
+  return std::ranges::all_of(costs, [&](const Cost& cost) {
+    return reads(cost.running) && reads(cost.terminal) && std::ranges::all_of(cost.samples, reads, &SampledCost::cost);
+  });
+}
 
 // ydot at a point, within a singular window continued as the state there.
 bool set_rates(SpatialDynamics& dynamics, const SingularWindow* w, const StatePoint& at, Eigen::VectorXd& ydot) {
@@ -185,6 +193,7 @@ SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSet
 SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                             const TangentSampling& sampling, const RunOptions& options, const Assembly& start,
                             Rates rates) {
+  if ((sampling.times.empty() || sampling.reads_positions) && reads_positions(costs)) rates = Rates::without_tangents;
   DrivenRun run(mechanism, settings, costs, sampling.times, options, start, true);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());

@@ -40,6 +40,8 @@ struct PointCost {
   virtual double value(const StatePoint& at) const = 0;
   // y_bar += scale d/dy, rho_bar += scale d/drho; returns the value.
   virtual double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const = 0;
+  // Whether it reads nothing of the state but positions.
+  virtual bool reads_positions() const { return false; }
   // The parameters that the cost is bound to, or null.
   virtual const Eigen::VectorXd* rho() const { return nullptr; }
   // The expression that shows where the value jumps, in all parameters, t and all sensors; null if there is none.

@@ -120,6 +120,7 @@ struct Sampling {
 struct TangentSampling {
   std::vector<double> times;
   std::function<void(std::size_t index, const StatePoint& at, const Eigen::MatrixXd& y_rho)> observe;
+  bool reads_positions = false;  // and nothing else of the state: solved runs may omit the rest
 };
 
 struct RunOptions {

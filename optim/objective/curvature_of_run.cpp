@@ -109,7 +109,11 @@ std::vector<CurvatureOfRun::Look> CurvatureOfRun::looks_of(const StepSequence& s
 TangentSampling CurvatureOfRun::sampling(const Mechanism& mechanism, const StepSequence& steps, double end_time) {
   looks_ = looks_of(steps, end_time);
   TangentSampling sampling;
-  for (const Look& look : looks_) sampling.times.push_back(look.time);
+  sampling.reads_positions = true;
+  for (const Look& look : looks_) {
+    sampling.times.push_back(look.time);
+    if (!look.expression || !look.expression->bind(mechanism)->reads_positions()) sampling.reads_positions = false;
+  }
   sampling.observe = [this, &mechanism](std::size_t index, const StatePoint& state, const MatrixXd& y_rho) {
     const Look& look = looks_[index];
     if (look.expression)

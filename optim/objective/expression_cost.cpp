@@ -71,6 +71,11 @@ class ExpressionCost : public PointCost {
     return value;
   }
 
+  bool reads_positions() const override {
+    return std::ranges::all_of(compiled_->sensors, [&](const auto& used) {
+      return mechanism_.data().sensors[index(used.sensor)]->reads == Reads::positions;
+    });
+  }
   const Eigen::VectorXd* rho() const override { return &mechanism_.rho(); }
   const SwitchedProgram* program() const override { return compiled_.get(); }
 
