@@ -287,7 +287,8 @@ int design_command(const CommandContext& context) {
                                              : fmt::format("{:.3g} s", design.wall_seconds));
   if (context.options.explain) {
     context.out << "\ndecisions:\n";
-    if (!design.gradient_choice.empty()) context.out << fmt::format("- gradients by {}\n", design.gradient_choice);
+    if (design.gradient_choice != to_string(GradientMethod::automatic))
+      context.out << fmt::format("- gradients by {}\n", design.gradient_choice);
     for (const std::string& decision : design.decisions) context.out << fmt::format("- {}\n", decision);
   }
   run.warn(design.warnings);

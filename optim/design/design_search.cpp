@@ -199,7 +199,10 @@ Problem away_from_dead_points(Problem problem, const std::vector<double>& instan
   sensor.name = "distance_from_dead_points";
   while (std::ranges::count(problem.scene.sensors, sensor.name, &Sensor::name) > 0) sensor.name += "_";
   problem.scene.sensors.push_back(sensor);
+  double end = problem.scene.simulation.end_time;
+  for (const CaseSpec& load_case : problem.cases) end = std::min(end, load_case.end_time.value_or(end));
   for (const double t : instants) {
+    if (t > end) continue;
     ObjectiveSpec& distance = problem.objectives.emplace_back();
     distance.name = fmt::format("{} at {:.17g} s", sensor.name, t);
     distance.samples.push_back({t, Expression::parse(sensor.name)});
@@ -216,7 +219,7 @@ Problem away_from_dead_points(Problem problem, const std::vector<double>& instan
 //   sqp      from the end of another local method that stalls or does not reach the limits, and of any method that has
 //            seen smooth extremes: it takes true ones
 //   ipopt    from the start, if `auto` finds no point near that satisfies the limits: it may come to another valley
-//   sqp      from the start with a distance from dead points, and from there without, if `auto` falls into one
+//   sqp      from the start with a distance from dead points, and from there without, if these fall into one
 class Searches {
  public:
   Searches(const Problem& problem, const DesignOptions& options) : problem_(problem), options_(options) {}
@@ -233,10 +236,10 @@ class Searches {
     const bool is_global = method && method->global;
     if (spec.is_sqp()) {
       if (best_.status == SolverStatus::infeasible) go_on_with_ipopt();
-      if (falls_into_dead_point()) go_round_dead_points(first.instants());
     } else if (first.smooths() || (!is_global && is_stuck())) {
       go_on_with_sqp();
     }
+    if (!is_global && falls_into_dead_point()) go_round_dead_points(first.instants());
     return ended();
   }
 
