@@ -85,6 +85,8 @@ Known dimension_of(const ObjectiveSpec& spec, const Dimensions& dimensions) {
 std::string unit_of(const ObjectiveSpec& spec, const Dimensions& dimensions) {
   if (spec.is_written_in_cpp()) return "";
   if (spec.eigenvalue) return spec.eigenvalue->value == "frequency" ? "Hz" : "-";
+  if (spec.frequency_response && spec.frequency_response->value == "phase") return "rad";
+  if (spec.frequency_response) return "";
   try {
     const Known found = dimension_of(spec, dimensions);
     return !found ? "" : found->is_none() ? "-" : to_string(*found);

@@ -88,8 +88,8 @@ bool sums_squares(const Problem& problem, const DesignSpec& spec, const Evaluato
   if (spec.minimize.empty() || (spec.over == "max" && problem.cases.size() > 1)) return false;
   for (std::size_t c = 0; c < evaluator.cases(); ++c) {
     const Objective& objective = evaluator.of_case(c).objectives()[0];
-    if (objective.is_extreme() || objective.is_linear() || objective.is_eigenvalue() || objective.is_written_in_cpp() ||
-        objective.free_instants())
+    if (objective.is_extreme() || objective.is_linear() || objective.is_of_linear_motion() ||
+        objective.is_written_in_cpp() || objective.free_instants())
       return false;
   }
   return true;

@@ -146,11 +146,12 @@ std::optional<SceneIssue> curvature_issue(const Problem& problem) {
     return SceneIssue{"design.optimizer.hessian", "is 'gauss_newton', but '" + name +
                                                       "' tracks points of free timing; take the optimizer "
                                                       "'least_squares', or 'lbfgs' or 'exact'"};
-  if (!objective.is_linear() && !objective.is_eigenvalue()) return std::nullopt;
+  if (!objective.is_linear() && !objective.is_of_linear_motion()) return std::nullopt;
   return SceneIssue{
       "design.optimizer.hessian",
       "is 'gauss_newton', but '" + name +
-          "' is linear in its sensors and parameters or an eigenvalue; Gauss-Newton neglects all its second "
+          "' is linear in its sensors and parameters, an eigenvalue or a response; Gauss-Newton neglects all its "
+          "second "
           "derivatives and is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or 'exact'"};
 }
 

@@ -405,6 +405,15 @@ bool Evaluator::add_parameters_only(Evaluation& e) const {
         e.psi(i) += objective.parameters_only(e.rho, options_.user_forces);
         continue;
       }
+      if (objective.has_response()) {
+        const std::vector<FrequencyResponse::Peak> peaks =
+            objective.response_peaks(e.rho, options_.user_forces, variables_);
+        e.psi(i) = peaks.front().value;
+        e.psi_rho.row(i) = peaks.front().gradient.transpose();
+        for (const FrequencyResponse::Peak& peak : peaks)
+          if (peaks.size() > 1) e.pieces.push_back({i, 1, peak.value, peak.gradient, peak.frequency});
+        continue;
+      }
       Eigen::VectorXd gradient = Eigen::VectorXd::Zero(e.rho.size());
       std::vector<std::string> doubts;
       e.psi(i) += objective.add_parameters_only_gradient(e.rho, gradient, options_.user_forces, &doubts);

@@ -17,7 +17,7 @@ namespace mbsopt::inline optim {
 namespace {
 
 // Adds the objective's name to an exception of f.
-double named(const std::string& objective, const auto& f) {
+auto named(const std::string& objective, const auto& f) {
   try {
     return f();
   } catch (const std::runtime_error& error) {
@@ -90,6 +90,9 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
     follow(spec.track[i], scene, fmt::format("{}.track[{}]", place, i));
   for (std::vector<Sample>* const all : {&samples_, &residuals_})
     std::stable_sort(all->begin(), all->end(), [](const Sample& a, const Sample& b) { return a.time < b.time; });
+  if (spec.frequency_response)
+    response_ = at_place(place + ".frequency_response",
+                         [&] { return std::make_shared<const FrequencyResponse>(scene, *spec.frequency_response); });
   if (spec.eigenvalue) mode_ = std::make_shared<const FollowedMode>(scene, *spec.eigenvalue);
   if (spec.parameters_only)
     parameters_only_ =
@@ -208,9 +211,16 @@ Derivatives Objective::integrand(double x, const ObjectivePart& part) const {
 
 double Objective::parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces) const {
   if (mode_) return named(name_, [&] { return mode_->value(rho, forces); });
+  if (response_) return named(name_, [&] { return response_->value(rho, forces); });
   if (!parameters_only_) return 0;
   Program::Scratch scratch = parameters_only_->scratch();
   return parameters_only_->value(view(rho), scratch);
+}
+
+std::vector<FrequencyResponse::Peak> Objective::response_peaks(const Eigen::VectorXd& rho,
+                                                               const FollowedMode::UserForces& forces,
+                                                               const std::vector<int>& variables) const {
+  return named(name_, [&] { return response_->peaks(rho, forces, variables); });
 }
 
 double Objective::add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar,
@@ -245,7 +255,7 @@ bool Objective::is_sum_of_squares() const {
 }
 
 bool Objective::is_linear() const {
-  if (mean_ || mode_) return false;
+  if (mean_ || mode_ || response_) return false;
   if ((running_ && !running_->is_linear()) || (terminal_ && !terminal_->is_linear())) return false;
   if (std::any_of(samples_.begin(), samples_.end(), [](const Sample& s) { return !s.value.is_linear(); })) return false;
   if (!parameters_only_) return true;

@@ -26,6 +26,7 @@
 #include "optim/objective/expression_cost.hpp"
 #include "optim/objective/followed_mode.hpp"
 #include "optim/objective/free_instants.hpp"
+#include "optim/objective/frequency_response.hpp"
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt::inline optim {
@@ -81,14 +82,20 @@ class Objective {
   const std::vector<Sample>& residuals() const { return residuals_; }
   bool is_sum_of_squares() const;
   double exponent(const ObjectivePart& part) const { return part.side * sharpness_; }  // k of an extreme
-  bool is_eigenvalue() const { return mode_ != nullptr; }
+  bool is_of_linear_motion() const { return mode_ || response_; }  // an eigenvalue, a frequency response
+  bool has_response() const { return response_ != nullptr; }
+  // The response and its gradient in these variables; of the largest amplitude with the lower peaks after it. Errors
+  // are std::runtime_error.
+  std::vector<FrequencyResponse::Peak> response_peaks(const Eigen::VectorXd& rho,
+                                                      const FollowedMode::UserForces& forces,
+                                                      const std::vector<int>& variables) const;
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
   const ObjectiveSpec& spec() const { return spec_; }  // of one that is not
   // Returns whether it is a sum of parts whose second derivatives in parameters and sensors are 0.
   bool is_linear() const;
 
-  // The part that depends on the parameters alone, and += d/drho. It includes an eigenvalue, whose errors are
-  // std::runtime_error.
+  // The part that depends on the parameters alone, and += d/drho. It includes an eigenvalue, and without its gradient a
+  // response; their errors are std::runtime_error.
   double parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces = {}) const;
   double add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar,
                                       const FollowedMode::UserForces& forces = {},
@@ -108,6 +115,7 @@ class Objective {
   std::optional<FreeInstants> free_instants_;
   std::optional<Program> parameters_only_;
   std::shared_ptr<const FollowedMode> mode_;
+  std::shared_ptr<const FrequencyResponse> response_;
   std::shared_ptr<const RunningCost> user_running_;
   std::shared_ptr<const TerminalCost> user_terminal_;
 };

@@ -95,13 +95,24 @@ void check_meaning(Checker& checker, const SignalSamples& samples) {
                                       (names.empty() ? "; there are no signals" : "; signals: " + joined(names)));
 }
 
-// Checker::check finds this function through the arguments' namespace.
+// Checker::check finds these functions through the arguments' namespace.
+void check_meaning(Checker& checker, const FrequencyResponseSpec& response) {
+  const bool at_one = response.value == "amplitude" || response.value == "phase";
+  if (at_one && (!response.at || response.from || response.to))
+    checker.issue(checker.path("at"), "is needed, without from and to: value is \"" + response.value + "\"");
+  if (!at_one && (response.at || !response.from || !response.to))
+    checker.issue(checker.path("from"), "and to are needed, without at: value is \"" + response.value + "\"");
+  if (response.from && response.to && *response.from >= *response.to)
+    checker.issue(checker.path("from"), "is " + text_of(*response.from) + ", not below to, " + text_of(*response.to));
+}
+
 void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   checker.must_be_identifier(checker.path(), objective.name);
   const bool sums = objective.running || objective.terminal || objective.parameters_only ||
                     !objective.samples.empty() || !objective.track.empty();
-  const long alone = count_of(objective.means) + objective.eigenvalue.has_value() + objective.is_written_in_cpp();
-  const std::vector<std::string> kinds = kinds_and({"eigenvalue", "user"});
+  const long alone = count_of(objective.means) + objective.eigenvalue.has_value() +
+                     objective.frequency_response.has_value() + objective.is_written_in_cpp();
+  const std::vector<std::string> kinds = kinds_and({"eigenvalue", "frequency_response", "user"});
   if (!sums && alone == 0)
     checker.issue(checker.path(),
                   "has no part; running, terminal, samples, track and parameters_only (added), or one of " +

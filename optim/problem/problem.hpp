@@ -27,6 +27,14 @@ struct EigenvalueSpec {
   std::string value = "frequency";  // [Hz], or "damping": its ratio
 };
 
+// The response to an input that swings, near the initial state (frequency_response.hpp).
+struct FrequencyResponseSpec {
+  std::string input, output;           // a parameter that acts through forces; a sensor
+  std::string value = "max";           // or "rms", in the band; "amplitude" or "phase" at a frequency
+  std::optional<double> from, to, at;  // [Hz]
+  double spectrum = 1;                 // of the input, for rms [unit^2/Hz]
+};
+
 // The instant of a tracked row: its time, the instant nearest to it, or the nearest in the order of the rows.
 enum class Timing { prescribed, free, ordered };
 
@@ -48,7 +56,7 @@ struct UserCostSpec {
 };
 
 // psi = integral of running + terminal at the end time + sum of samples and track + parameters_only. Or it is, alone,
-// one of the means of objective_kinds.hpp, or an eigenvalue.
+// one of the means of objective_kinds.hpp, an eigenvalue or a frequency response.
 struct ObjectiveSpec {
   std::string name;
   std::optional<Expression> running, terminal, parameters_only;
@@ -56,7 +64,8 @@ struct ObjectiveSpec {
   std::vector<TrackTerm> track;
   Means means;
   std::optional<EigenvalueSpec> eigenvalue;  // alone
-  std::optional<double> sharpness;           // of an extreme [1/unit of the expression]
+  std::optional<FrequencyResponseSpec> frequency_response;
+  std::optional<double> sharpness;  // of an extreme [1/unit of the expression]
   static constexpr double kSharpness = 100;
   // Costs in C++ that replace all of the above. No file has them, but design, check and the others take them.
   std::shared_ptr<const RunningCost> running_in_cpp = {};

@@ -53,6 +53,20 @@ void describe(auto& v, Like<EigenvalueSpec> auto& e) {
   v.word("value", e.value, Words{"frequency damping"}, {"natural frequency [Hz], or damping ratio"});
 }
 
+void describe(auto& v, Like<FrequencyResponseSpec> auto& r) {
+  v.reference(
+      "input", r.input, ElementKind::parameter,
+      {"that swings, and acts through forces: a force, the length of a spring on a moving road", Need::required});
+  v.reference("output", r.output, ElementKind::sensor, {"that answers", Need::required});
+  v.word("value", r.value, Words{"max rms amplitude phase"},
+         {"the largest amplitude between `from` and `to`, the root of its mean square there under a spectrum of the "
+          "input, or the amplitude or phase [rad] at a frequency"});
+  v.plain("from", r.from, kNotNegative, {"[Hz], of max and rms"});
+  v.plain("to", r.to, kPositive, {"[Hz]"});
+  v.plain("at", r.at, kNotNegative, {"[Hz], of amplitude and phase"});
+  v.plain("spectrum", r.spectrum, kPositive, {"of rms: power density of the input [its unit^2/Hz]"});
+}
+
 void describe(auto& v, Like<UserCostSpec> auto& c) {
   v.text("cost", c.cost, {"its name", Need::required});
   v.references("bodies", c.bodies, ElementKind::body, {"whose states it reads, in its order; all when absent"});
@@ -72,6 +86,8 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
   v.law("parameters_only", o.parameters_only, Scope::none, {"added; of parameters only"});
   describe_means(v, o.means);
   v.object("eigenvalue", o.eigenvalue, {"alone: frequency or damping ratio of a mode near the initial equilibrium"});
+  v.object("frequency_response", o.frequency_response,
+           {"alone: how a sensor answers to a parameter that swings, near the initial equilibrium"});
   v.object("user", o.user, {"alone: a cost written in C++, of a plug-in or of the program"});
   v.plain("sharpness", o.sharpness, kPositive,
           {"of maximum_of, minimum_of, peak_to_peak_of: k in log(mean exp(k x))/k [1/unit of the expression]; 100 when "

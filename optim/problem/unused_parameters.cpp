@@ -59,7 +59,8 @@ class MentionSearch {
     describe_to(found, sensor);
   }
   void add(const ObjectiveSpec& objective, Mentions& found) const {
-    if (objective.eigenvalue || (objective.user && objective.user->bodies.empty())) add_whole(found);
+    if (objective.eigenvalue || objective.frequency_response || (objective.user && objective.user->bodies.empty()))
+      add_whole(found);
     describe_to(found, objective);
   }
   void add_whole(Mentions& found) const {

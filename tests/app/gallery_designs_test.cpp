@@ -127,6 +127,13 @@ TEST_CASE("double_wishbone/hard_points: the given suspension is found again", "[
   CHECK(value(result, "tie_z") == Approx(0.28).epsilon(1e-6));
 }
 
+// Reference: the true minimax at a mass ratio of 0.05, where Den Hartog's rule has 6.40844.
+TEST_CASE("damper/absorber: both resonances are equally high, at the least height", "[gallery]") {
+  const auto result = designed("damper/absorber", {});
+  CHECK(result.at("optimizer").at("status") == "converged");
+  CHECK(result.at("optimizer").at("objective_final").get<double>() * 360000 == Approx(6.40792).epsilon(2e-6));
+}
+
 // Reference: as below, both peaks by Newton's method, and golden section searches in c and in k.
 TEST_CASE("quarter_car/compromise: the sum of comfort and strokes is least where the linear system has it",
           "[gallery]") {
