@@ -1,12 +1,12 @@
 #include "optim/objective/frequency_response.hpp"
 
-#include <fmt/format.h>
-
+#include <Eigen/LU>
 #include <algorithm>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
-#include <boost/math/tools/minima.hpp>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <numbers>
 #include <stdexcept>
 
@@ -23,6 +23,17 @@ namespace {
 
 std::complex<double> response(const Linearisation& x, double f) {
   return transfer(x, {0, 2 * std::numbers::pi * f})(0, 0);
+}
+
+// d|H|^2/df up to a factor: Re(conj(H) H_f),  H_s = -C (s - A)^-2 B
+double slope(const Linearisation& x, double f) {
+  const std::complex<double> s(0, 2 * std::numbers::pi * f);
+  Eigen::MatrixXcd left = -x.A;
+  left.diagonal().array() += s;
+  const Eigen::PartialPivLU<Eigen::MatrixXcd> factor(left);
+  const Eigen::MatrixXcd X = factor.solve(x.B.cast<std::complex<double>>());
+  const std::complex<double> H = (x.C * X + x.D)(0, 0), H_s = -(x.C * factor.solve(X))(0, 0);
+  return (std::conj(H) * std::complex<double>(0, 1) * H_s).real();
 }
 
 template <class Element>
@@ -96,7 +107,6 @@ double FrequencyResponse::value_at(const Linearisation& x, double f) const {
 
 // The highest first.
 std::vector<FrequencyResponse::Peak> FrequencyResponse::peaks_of(const Linearisation& x) const {
-  constexpr int kBits = 26;  // a frequency to the root of rounding
   constexpr std::size_t kMost = 8;
   const std::vector<double> f = frequencies(x);
   std::vector<double> sizes;
@@ -106,10 +116,15 @@ std::vector<FrequencyResponse::Peak> FrequencyResponse::peaks_of(const Linearisa
     const bool rises = k == 0 || sizes[k] >= sizes[k - 1], falls = k + 1 == f.size() || sizes[k] > sizes[k + 1];
     if (!rises || !falls) continue;
     Peak peak{f[k], sizes[k], {}};
-    if (k > 0 && k + 1 < f.size()) {
-      const auto [at, least] = boost::math::tools::brent_find_minima(
-          [&](double here) { return -std::abs(response(x, here)); }, f[k - 1], f[k + 1], kBits);
-      if (-least > peak.value) peak = {at, -least, {}};
+    if (k > 0 && k + 1 < f.size()) {  // to rounding, as the gradient is that at this frequency
+      const double before = slope(x, f[k - 1]), after = slope(x, f[k + 1]);
+      std::uintmax_t turns = 100;
+      if (before > 0 && after < 0)
+        peak.frequency =
+            boost::math::tools::toms748_solve([&](double here) { return slope(x, here); }, f[k - 1], f[k + 1], before,
+                                              after, boost::math::tools::eps_tolerance<double>(50), turns)
+                .first;
+      peak.value = std::abs(response(x, peak.frequency));
     }
     peaks.push_back(peak);
   }
