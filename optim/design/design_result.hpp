@@ -105,7 +105,7 @@ struct DesignResult : SolverOutcome {
   bool is_at_boundary() const;  // a bound of a variable, or a limit, holds the solution back or just holds
   bool ok() const {
     return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||
-           status == SolverStatus::no_progress || status == SolverStatus::searched;
+           status == SolverStatus::searched;
   }
 };
 

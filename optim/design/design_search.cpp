@@ -11,7 +11,9 @@
 #include <utility>
 
 #include "core/expression/counted.hpp"
+#include "core/mechanism/mechanism.hpp"
 #include "core/simulate/simulation_warnings.hpp"
+#include "core/start/assembly.hpp"
 #include "optim/design/chosen_solver.hpp"
 #include "optim/design/closing.hpp"
 #include "optim/design/design_description.hpp"
@@ -97,6 +99,12 @@ class SingleDesign {
     if (program_.spec().optimizer.is_sqp()) return false;
     return program_.objective().is_maximum() ||
            std::ranges::any_of(program_.evaluator().objectives(), &Objective::is_extreme);
+  }
+  const std::vector<Body>& bodies() const { return program_.problem().scene.bodies; }
+  // Squares at free instants, of which least_squares alone has a Gauss-Newton matrix.
+  bool has_free_squares() const {
+    const Objective& minimised = program_.evaluator().of_case(0).objectives()[0];
+    return program_.spec().optimizer.type == OptimizerSpec::kLeastSquares && minimised.free_instants();
   }
   std::vector<double> instants() const { return closing_instants(program_.evaluator().of_case(0)); }
 
@@ -220,6 +228,8 @@ Problem away_from_dead_points(Problem problem, const std::vector<double>& instan
 //            seen smooth extremes: it takes true ones
 //   ipopt    from the start, if `auto` finds no point near that satisfies the limits: it may come to another valley
 //   sqp      from the start with a distance from dead points, and from there without, if these fall into one
+//
+// Squares at free instants go on by least_squares, from the poses of its end.
 class Searches {
  public:
   Searches(const Problem& problem, const DesignOptions& options) : problem_(problem), options_(options) {}
@@ -236,10 +246,12 @@ class Searches {
     const bool is_global = method && method->global;
     if (spec.is_sqp()) {
       if (best_.status == SolverStatus::infeasible) go_on_with_ipopt();
+    } else if (first.has_free_squares()) {
+      go_on_in_poses();
     } else if (first.smooths() || (!is_global && is_stuck())) {
       go_on_with_sqp();
     }
-    if (!is_global && falls_into_dead_point()) go_round_dead_points(first.instants());
+    if (!is_global && !first.has_free_squares() && falls_into_dead_point()) go_round_dead_points(first.instants());
     return ended();
   }
 
@@ -270,6 +282,13 @@ class Searches {
     if (std::optional<SingleDesign> search = prepared(continued(best_), "sqp", options_))
       take(*search, "from that end");
   }
+  void go_on_in_poses() {
+    constexpr int kMost = 5;
+    for (int k = 0; k < kMost && best_.status == SolverStatus::no_progress; ++k) {
+      std::optional<SingleDesign> search = prepared(continued(best_), OptimizerSpec::kLeastSquares, options_);
+      if (!search || !take(*search, "from that end, in its poses")) return;
+    }
+  }
   void go_round_dead_points(const std::vector<double>& instants) {
     DesignOptions without_scale = options_;  // which has no place for the distances
     without_scale.scale.reset();
@@ -290,6 +309,12 @@ class Searches {
     for (std::size_t p = 0; p < next.scene.parameters.size(); ++p)
       next.scene.parameters[p].value = from.rho(static_cast<Eigen::Index>(p));
     if (from.mode && !from.mode->bodies.empty()) next.scene.bodies = from.mode->bodies;
+    if (!from.final_evaluation.statistics.solved) return next;
+    const Mechanism mechanism(next.scene, from.rho, std::vector<bool>(next.scene.parameters.size(), false),
+                              options_.user_forces);
+    const Assembly reached(mechanism, next.scene.simulation.start_time);
+    if (reached.result().ok)
+      set_guess(next.scene, mechanism, {reached.result().y.head(reached.result().y.size() / 2), 0});
     return next;
   }
 
@@ -317,7 +342,10 @@ class Searches {
       if (other.status == SolverStatus::stopped) best_.end(other.status, other.message);
       return false;
     }
-    if (!other.mode && best_.mode) other.mode = best_.mode;
+    Scene there = problem_.scene;
+    there.bodies = search.bodies();
+    if (!other.mode && lead_to_other_poses(problem_.scene, there, other.rho, options_.user_forces))
+      other.mode = DesignMode{0, 0, search.bodies()};
     if (other.status != SolverStatus::converged)
       other.message += fmt::format("; {} before: {}", best_.optimizer, best_.message);
     other.warnings.insert(other.warnings.begin(), doubts_.begin(), doubts_.end());

@@ -113,16 +113,20 @@ void Evaluator::follow(const Eigen::VectorXd& rho) {
 }
 
 bool Evaluator::has_left_guess(const Eigen::VectorXd& rho) const {
-  constexpr double kSame = 1e-6;  // relative
   if (!cases_.empty()) return cases_.front().has_left_guess(rho);
-  if (!given_) return false;
-  const Assembly own(Mechanism(*given_, rho, active(false), options_.user_forces, programs_),
-                     scene_.simulation.start_time),
-      followed(mechanism(rho, false), scene_.simulation.start_time);
-  if (!followed.result().ok) return false;
-  if (!own.result().ok) return true;
-  const Eigen::VectorXd &q = own.result().y, &there = followed.result().y;
-  return (q - there).norm() > kSame * (1 + q.norm());
+  return given_ && lead_to_other_poses(*given_, scene_, rho, options_.user_forces);
+}
+
+bool lead_to_other_poses(const Scene& own, const Scene& other, const Eigen::VectorXd& rho,
+                         const std::vector<std::shared_ptr<const UserForce>>& forces) {
+  constexpr double kSame = 1e-6;  // relative
+  const auto poses = [&](const Scene& scene) {
+    const std::vector<bool> none(scene.parameters.size(), false);
+    return Assembly(Mechanism(scene, rho, none, forces), scene.simulation.start_time).result();
+  };
+  const auto there = poses(other), here = poses(own);
+  if (!there.ok) return false;
+  return !here.ok || (here.y - there.y).norm() > kSame * (1 + here.y.norm());
 }
 
 std::vector<bool> Evaluator::active(bool derivatives) const {

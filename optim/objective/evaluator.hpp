@@ -176,4 +176,9 @@ class Evaluator {
   std::vector<Evaluator> cases_;            // one for each
 };
 
+// Whether the guesses of two scenes, alike in all else, lead to different poses at rho. No, if the other does not
+// close.
+bool lead_to_other_poses(const Scene& own, const Scene& other, const Eigen::VectorXd& rho,
+                         const std::vector<std::shared_ptr<const UserForce>>& forces);
+
 }  // namespace mbsopt::inline optim
