@@ -91,12 +91,17 @@ CurvatureOfRun::CurvatureOfRun(std::span<const Objective> objectives, const std:
 CurvatureOfRun::~CurvatureOfRun() = default;
 
 // In the order of time.
-std::vector<CurvatureOfRun::Look> CurvatureOfRun::looks_of(const StepSequence& steps, double end_time) const {
+std::vector<CurvatureOfRun::Look> CurvatureOfRun::looks_of(const StepSequence& steps, double start_time,
+                                                           double end_time) const {
+  constexpr int kPanels = 30;  // of a run without given steps: 90 looks, as a report has some 100 rows
   std::vector<Look> looks;
   const bool integrates = std::ranges::any_of(objectives_, [](const Objective& o) { return o.running().has_value(); });
-  for (std::size_t i = 0; integrates && i < steps.times.size(); ++i)
-    for (std::size_t j = 0; j < kNodes.size(); ++j)
-      looks.push_back({steps.times[i] + kNodes[j] * steps.sizes[i], kWeights[j] * steps.sizes[i]});
+  const auto add_panel = [&](double t, double h) {
+    for (std::size_t j = 0; j < kNodes.size(); ++j) looks.push_back({t + kNodes[j] * h, kWeights[j] * h});
+  };
+  for (std::size_t i = 0; integrates && i < steps.times.size(); ++i) add_panel(steps.times[i], steps.sizes[i]);
+  const double h = (end_time - start_time) / kPanels;
+  for (int k = 0; integrates && steps.times.empty() && k < kPanels; ++k) add_panel(start_time + k * h, h);
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
     if (objectives_[i].terminal()) looks.push_back({end_time, 0, i, &*objectives_[i].terminal()});
     for (const Objective::Sample& sample : objectives_[i].samples())
@@ -106,14 +111,17 @@ std::vector<CurvatureOfRun::Look> CurvatureOfRun::looks_of(const StepSequence& s
   return looks;
 }
 
-TangentSampling CurvatureOfRun::sampling(const Mechanism& mechanism, const StepSequence& steps, double end_time) {
-  looks_ = looks_of(steps, end_time);
+TangentSampling CurvatureOfRun::sampling(const Mechanism& mechanism, const StepSequence& steps,
+                                         const SimulationSettings& settings) {
+  looks_ = looks_of(steps, settings.start_time, settings.end_time);
   TangentSampling sampling;
   sampling.reads_positions = true;
   for (const Look& look : looks_) {
     sampling.times.push_back(look.time);
-    if (!look.expression || !look.expression->bind(mechanism)->reads_positions()) sampling.reads_positions = false;
+    if (look.expression && !look.expression->bind(mechanism)->reads_positions()) sampling.reads_positions = false;
   }
+  for (const Objective& o : objectives_)
+    if (o.running() && !o.running()->bind(mechanism)->reads_positions()) sampling.reads_positions = false;
   sampling.observe = [this, &mechanism](std::size_t index, const StatePoint& state, const MatrixXd& y_rho) {
     const Look& look = looks_[index];
     if (look.expression)

@@ -1,7 +1,7 @@
 // The Gauss-Newton matrices of objectives (gauss_newton.hpp), gathered at instants of a tangent-linear run.
 //
 //   CurvatureOfRun curvature(objectives, variables);
-//   const TangentSampling sampling = curvature.sampling(mechanism, steps, end_time);
+//   const TangentSampling sampling = curvature.sampling(mechanism, steps, settings);
 //   simulate_tlm(mechanism, settings, costs, sampling, options);
 //   curvature.matrix(0, rho);   // of the first objective, variable x variable
 #pragma once
@@ -20,14 +20,15 @@ class CurvatureOfRun {
   CurvatureOfRun(std::span<const Objective> objectives, const std::vector<int>& variables);
   ~CurvatureOfRun();
 
-  // Integrals are looked at on given steps, samples and terminal values without any. The mechanism outlives the run.
-  TangentSampling sampling(const Mechanism& mechanism, const StepSequence& steps, double end_time);
+  // Integrals are looked at on given steps; without any, on equal parts of the run: what a search needs of a matrix.
+  // The mechanism outlives the run.
+  TangentSampling sampling(const Mechanism& mechanism, const StepSequence& steps, const SimulationSettings& settings);
   Eigen::MatrixXd matrix(std::size_t objective, const Eigen::VectorXd& rho) const;
 
  private:
   class Gathered;
   struct Look;
-  std::vector<Look> looks_of(const StepSequence& steps, double end_time) const;
+  std::vector<Look> looks_of(const StepSequence& steps, double start_time, double end_time) const;
 
   std::span<const Objective> objectives_;
   const std::vector<int>& variables_;

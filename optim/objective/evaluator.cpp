@@ -100,6 +100,8 @@ Evaluator Evaluator::in(Scene scene, GradientMethod method) const {
 
 void Evaluator::gather_curvature() {
   gathers_curvature_ = true;
+  const bool has_extremes = std::ranges::any_of(objectives_, &Objective::is_extreme);
+  if (options_.method == GradientMethod::automatic && !has_extremes) options_.method = GradientMethod::tlm;
   for (Evaluator& of_case : cases_) of_case.gather_curvature();
 }
 
@@ -308,15 +310,13 @@ bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* fr
   try {
     const Mechanism at_rho = mechanism(e.rho, sweep != Sweep::none);
     const RunOptions options{.frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
-    const bool gathers =
-        gathers_curvature_ && !frozen && sweep == Sweep::forward && !by_cvodes && !objectives_[0].running();
+    const bool gathers = gathers_curvature_ && !frozen && sweep == Sweep::forward && !by_cvodes;
     std::optional<CurvatureOfRun> curvature;
     const auto simulated = [&](std::span<const Cost> costs) {
       ++e.simulations;
       TangentSampling sampling;
       if (gathers)
-        sampling =
-            curvature.emplace(std::span(objectives_).first(1), variables_).sampling(at_rho, {}, settings.end_time);
+        sampling = curvature.emplace(std::span(objectives_).first(1), variables_).sampling(at_rho, {}, settings);
       return sweep == Sweep::forward    ? simulate_tlm(at_rho, settings, costs, sampling, options)
              : sweep == Sweep::backward ? simulate_adjoint(at_rho, settings, costs, options)
                                         : simulate(at_rho, settings, costs, {}, options);

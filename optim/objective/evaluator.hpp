@@ -109,8 +109,8 @@ class Evaluator {
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
   Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
 
-  // From now on gradients come with the Gauss-Newton matrix of the first objective, where a forward sweep meets all
-  // instants that it looks at.
+  // From now on gradients come with the Gauss-Newton matrix of the first objective where a forward sweep gives them. It
+  // does if nothing else was asked for, except with true extremes, whose instants are not known before.
   void gather_curvature();
 
   // The poses of the last evaluation, which is at rho, become the guess of the next ones if the drives determine them:

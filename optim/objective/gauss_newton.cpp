@@ -24,7 +24,7 @@ Hessians gauss_newton(const Evaluator& evaluator, const Evaluation& at, std::siz
     const SimulationSettings& settings = evaluator.scene().simulation;
     const Mechanism mechanism = evaluator.mechanism(at.rho, true);
     const SimulationResult run =
-        simulate_tlm(mechanism, settings, {}, curvature.sampling(mechanism, at.steps, settings.end_time),
+        simulate_tlm(mechanism, settings, {}, curvature.sampling(mechanism, at.steps, settings),
                      {&at.steps, evaluator.options().progress});
     result.ok = run.ok();
     result.message = run.message;

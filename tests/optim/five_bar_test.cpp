@@ -144,7 +144,7 @@ TEST_CASE("a design that is stopped keeps the best point it has seen", "[five_ba
     options.simulation_progress = [=](double t) mutable {
       simulations += t < last;
       last = t;
-      return simulations < 10;
+      return simulations < 5;
     };
   }
   const DesignResult result = run_design(problem, options);
