@@ -108,7 +108,8 @@ def ride():
 def eighteen_points():
     """The path of a four-bar: two circles meet."""
     # crank, coupler, rocker, Ax, Ay, Bx, By, Px, Py, phase
-    model = Model([0.4, 1.5, 1.2, 0, 0.2, 1.5, 0.5, 0.5, 0.5, 1], 3 * [0.05] + 6 * [-5] + [-7], 3 * [10] + 6 * [5] + [7])
+    model = Model([0.4, 1.5, 1.2, 0, 0.2, 1.5, 0.5, 0.5, 0.5, 1], 3 * [0.05] + 6 * [-5] + [-7],
+                  3 * [10] + 6 * [5] + [7])
     data = np.loadtxt(PROBLEMS.parent / "data/synthesis/eighteen_points.csv", delimiter=",", skiprows=1, comments="#")
 
     def residuals(x):

@@ -183,7 +183,7 @@ RightSingular right_singular(const MatrixXd& A) {
   return {svd.singularValues(), svd.matrixV()};
 }
 
-// Of G = A'A, or AA' if that is smaller: its least eigenvalue, and the vector by inverse iteration. As long as the
+// Takes the least eigenvalue of G = A'A, or AA' if that is smaller, and its vector by inverse iteration. As long as the
 // singular value is far above the root of rounding, this has no fewer digits than the decomposition of A.
 LeastSingular least_singular(const MatrixXd& A) {
   constexpr double kFarAboveRounding = 1e-5;  // of the largest

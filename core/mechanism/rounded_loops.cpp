@@ -426,7 +426,7 @@ JointLengths joint_lengths(const MechanismData& data) {
 void close_rounded_loops(MechanismData& data, double tolerance, IndependentLoops& known) {
   if (!(tolerance > 0) || data.n == 0 || data.n > kMostBodies || known.in_space || !closes_loops(data)) return;
   using Outcome = Loops::Outcome;
-  // Of a planar mechanism, equations across the plane are redundant and agree wherever the heights do.
+  // Equations across the plane of a planar mechanism are redundant, and agree wherever the heights do.
   if (const PlanarModel* plane = data.planar.get(); plane && heights_agree(data, *plane)) {
     if (known.in_plane) return;
     const Outcome outcome = Loops(data, kReaches[0] * tolerance, plane).look();

@@ -1,5 +1,5 @@
-// What mechanisms of a scene at different parameter values share: its expressions as programs, each compiled once, and
-// what is known of its loops. Several threads may use them.
+// Mechanisms of a scene at different parameter values share its expressions as programs, each compiled once, and what
+// is known of its loops. Several threads may use them.
 //
 //   const auto programs = std::make_shared<ScenePrograms>(scene);
 //   const Mechanism first(scene, rho, active, {}, programs), second(scene, other_rho, active, {}, programs);

@@ -36,7 +36,7 @@ struct DesignConstraint {
   std::string in_words() const;  // "peak", "peak (cold)"
 };
 
-// What is minimised in one load case; or a term of it.
+// The objective in one load case, or a term of what is minimised, at both ends of the search.
 struct DesignCase {
   std::string name;
   double weight = 1, initial = 0, value = 0;

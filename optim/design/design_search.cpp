@@ -81,7 +81,7 @@ class SingleDesign {
   SingleDesign(const Problem& problem, const DesignOptions& options)
       : options_(options), program_(problem, until_abandoned(), [this] { return abandoned_.load(); }) {}
 
-  // What the optimiser is given, in words.
+  // Returns in words what the optimiser is given.
   std::string description() const {
     const OptimizerSpec& spec = program_.spec().optimizer;
     std::string words = fmt::format("{} on {}", spec.chosen(), counted(program_.variables(), "variable"));
@@ -199,8 +199,8 @@ class SingleDesign {
 
 // The problem with a limit on the distance from dead points, where the Jacobian of joints and drives is singular.
 Problem away_from_dead_points(Problem problem, const std::vector<double>& instants) {
-  // Of smallest_singular_value, 1 at most. Limits between 0.02 and 0.1 lead from nearly all starts of paths of
-  // four-bars to an optimum; smaller ones are seen too late.
+  // The largest smallest_singular_value is 1. Of two sets of 60 starts of a four-bar's path, 102 to 104 end in an
+  // optimum with limits from 0.05 to 0.2.
   constexpr double kDistance = 0.1;
   Sensor sensor;
   sensor.quantity = "smallest_singular_value";

@@ -26,7 +26,7 @@ class CaseObjective {
   bool is_maximum() const { return k_ > 0; }
   bool is_true_maximum() const { return std::isinf(k_); }
   const Eigen::VectorXd& weights() const { return w_; }
-  // Of one load case, without its weight.
+  // Returns the value of one load case, without its weight.
   double of_case(const Eigen::VectorXd& psi, Eigen::Index load_case) const;
 
  private:

@@ -165,7 +165,7 @@ struct DesignSpec {
   OptimizerSpec optimizer;
   std::optional<MultistartSpec> multistart;
 
-  // What is minimised: the weighted sum, or the largest, of these. To maximise f is to minimise -f.
+  // Returns the terms whose weighted sum, or largest, is minimised. To maximise f is to minimise -f.
   std::vector<WeightedObjective> terms() const;
   double sign() const { return maximize.empty() ? 1 : -1; }
   std::string name() const;  // of what is sought: "comfort", "mass + 0.01 travel", "largest of a, b"
