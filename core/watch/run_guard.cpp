@@ -20,12 +20,14 @@ constexpr double kNoticeableChange = 1e-3;                  // of the natural en
 constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
 constexpr double kGrowth = 1e3;                             // of the largest speed at the start
 
-// The natural size of the energy of a motion. It is a scale for runs that begin at rest at zero potential.
+// The natural size of the energy of a motion: of weights at their height, or at the radius of gyration of a body, and of
+// springs. It is a scale for runs that begin at rest at zero potential.
 double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
   const StateLayout layout{d.n};
   double sum = 0;
   for (std::size_t k = 1; k < d.bodies.size(); ++k) {
-    sum += d.bodies[k].mass * d.gravity.norm() * y.segment<3>(layout.q(k)).norm();
+    const double mass = d.bodies[k].mass, gyration = std::sqrt(mass * std::max(d.bodies[k].J.trace(), 0.0));  // m |i|
+    sum += d.gravity.norm() * (mass * y.segment<3>(layout.q(k)).norm() + gyration);
   }
   d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();

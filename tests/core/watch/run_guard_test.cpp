@@ -46,6 +46,25 @@ TEST_CASE("a bushing below half a turn runs through", "[simulation]") {
   CHECK(result.ok());
 }
 
+TEST_CASE("a balanced wheel at rest in its bearing gains no energy", "[simulation]") {
+  Scene scene = block_in_rubber(vec("0", "0", "0"), 0);
+  scene.forces.clear();
+  scene.gravity = {-2.2512474472877626, -8.659975506981569, -4.013993665859441};
+  scene.bodies[0].mass = 1.97;
+  scene.bodies[0].position = vec("0", "0", "0");
+  scene.bodies[0].orientation =
+      EulerParametersField{{0.7077766159238739, 0.0838023093128962, -0.6589369293806315, -0.24048192864246531}};
+  Joint bearing;
+  bearing.name = "bearing", bearing.type = "revolute", bearing.body1 = "ground", bearing.body2 = "block";
+  bearing.axis1 = VectorField{-0.9736399286915033, 0.198272345849592, 0.11726195516408827};
+  bearing.axis2 = vec("0", "0", "1");
+  scene.joints.push_back(bearing);
+  scene.simulation.end_time = 0.1;
+  const SimulationResult result = run(scene);
+  INFO(result.message);
+  CHECK(result.ok());
+}
+
 TEST_CASE("a body that turns more often than steps are allowed is refused at the start", "[simulation]") {
   const auto [method, wx, wy, info] = GENERATE(
       table<std::string, std::string, std::string, std::string>({{"dopri853", "1e9", "3e8", "1.04e+09 rad/s"},
