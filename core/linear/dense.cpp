@@ -183,29 +183,42 @@ RightSingular right_singular(const MatrixXd& A) {
   return {svd.singularValues(), svd.matrixV()};
 }
 
-// Takes the least eigenvalue of G = A'A, or AA' if that is smaller, and its vector by inverse iteration. As long as the
-// singular value is far above the root of rounding, this has no fewer digits than the decomposition of A.
+// Takes the least eigenvalue of G = A'A, or AA' if that is smaller, and its vector x by inverse iteration. With the
+// Rayleigh quotient theta and the residual r of x, an eigenvalue is within r of theta, and the least one is below
+// theta. If G - (theta - 2 r) I has a Cholesky factor, none is below the shift, which then speeds up the iteration. As
+// long as the singular value is far above the root of rounding, this has no fewer digits than the decomposition of A.
 LeastSingular least_singular(const MatrixXd& A) {
   constexpr double kFarAboveRounding = 1e-5;  // of the largest
   constexpr double kShift = 1e-10;            // of the largest eigenvalue, so that the matrix has an inverse
+  constexpr double kNearer = 0.1;             // what a factor has to gain: it costs as much as three steps
+  constexpr int kMost = 30;                   // eight to ten are usual
   const bool is_wide = A.rows() < A.cols();
   const MatrixXd G = is_wide ? MatrixXd(A * A.transpose()) : MatrixXd(A.transpose() * A);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(G, Eigen::EigenvaluesOnly);
-  const double least = gram.eigenvalues()(0), largest = gram.eigenvalues().tail<1>()(0);
-  if (least > kFarAboveRounding * kFarAboveRounding * largest) {
-    MatrixXd shifted = G;
-    shifted.diagonal().array() -= least - kShift * largest;
-    const Eigen::LLT<MatrixXd> factor(shifted);
-    VectorXd inner = VectorXd::LinSpaced(G.rows(), 1, 2), before;  // of no symmetry of mechanisms
-    for (int k = 0; factor.info() == Eigen::Success && k < 8; ++k) {
-      before = std::exchange(inner, factor.solve(inner).normalized());
-      if ((inner - before).norm() > 1e-14) continue;
+  const double largest = G.trace();  // not below the largest eigenvalue
+  Eigen::LLT<MatrixXd> factor(G);
+  double shift = 0;
+  VectorXd inner = VectorXd::LinSpaced(G.rows(), 1, 2).normalized(), before;  // of no symmetry of mechanisms
+  MatrixXd shifted;
+  for (int k = 0; factor.info() == Eigen::Success && k < kMost; ++k) {
+    before = std::exchange(inner, factor.solve(inner).normalized());
+    const VectorXd image = G * inner;
+    const double theta = inner.dot(image);
+    if (!(theta > kFarAboveRounding * kFarAboveRounding * largest)) break;
+    if (shift > 0 && (inner - before).norm() <= 1e-14) {
       VectorXd outer = is_wide ? VectorXd(A.transpose() * inner) : VectorXd(A * inner);
       const double value = outer.norm();
       outer /= value;
       if (is_wide) inner.swap(outer);
       return {value, outer, inner};
     }
+    const double lower = theta - 2 * (image - theta * inner).norm() - kShift * largest;
+    if (theta - lower > kNearer * (theta - shift)) continue;
+    shifted = G;
+    shifted.diagonal().array() -= lower;
+    Eigen::LLT<MatrixXd> nearer(shifted);
+    if (nearer.info() != Eigen::Success) continue;
+    factor = std::move(nearer);
+    shift = lower;
   }
   const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
   const Index last = svd.singularValues().size() - 1;

@@ -48,7 +48,7 @@ void add_pull_back_of_loads(const ReactionSensor& s, const Eigen::VectorXd& y, c
   for (const Constraint& c : to.data.constraints) {
     if (c.joint != s.joint) continue;
     const ConstraintRows change =
-        add_virtual_work_gradient(c, y, Vec<6>::Zero(), eta, -lambda.segment(c.row, c.rows()), to);
+        add_virtual_work_gradient(c, body_at(y, c.body1), body_at(y, c.body2), Vec<6>::Zero(), eta, -lambda.segment(c.row, c.rows()), to);
     lambda_bar.segment(c.row, c.rows()) -= to.scale * c.factor * change;
   }
 }

@@ -20,6 +20,7 @@ namespace mbsopt {
 namespace {
 
 struct Scaled {
+  std::vector<BodyAt> bodies;   // the ground first
   Eigen::MatrixXd J;            // rows of length 1
   Eigen::VectorXd norms;        // |j_i|
   double length = 1;            // L [m]
@@ -45,12 +46,12 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
 
   const StateLayout layout{d.n};
   out.J = Eigen::MatrixXd::Zero(d.m, 6 * d.n);
+  for (int body = 0; body <= d.n; ++body) out.bodies.push_back(body_at(y, body));
   for (const Constraint& c : d.constraints) {
-    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
     std::visit(
         [&]<class P>(const P& p) {
           Mat<P::kRows, 6> J1, J2;
-          p.jacobian(b1.frame, b2.frame, J1, J2);
+          p.jacobian(out.bodies[at(c.body1)].frame, out.bodies[at(c.body2)].frame, J1, J2);
           J1.template rightCols<3>() /= out.length, J2.template rightCols<3>() /= out.length;
           if (c.body1 > 0) out.J.block<P::kRows, 6>(c.row, layout.z(c.body1)) += c.factor * J1;
           if (c.body2 > 0) out.J.block<P::kRows, 6>(c.row, layout.z(c.body2)) += c.factor * J2;
@@ -69,37 +70,31 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
 }
 
 struct SingularValueFunction final : SensorFunction {
-  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
-    const Scaled x = scaled(d, at.y);
+  double evaluate(const MechanismData& d, const StatePoint& state, SensorGradient* to) const override {
+    const Scaled x = scaled(d, state.y);
     if (!to || x.J.size() == 0) return x.smallest;
-    Eigen::MatrixXd W = Eigen::MatrixXd::Zero(x.J.rows(), x.J.cols());  // w_i, then J's own columns
-    const StateLayout layout{d.n};
+    // The rows w_i, then in J's own columns.
+    const Eigen::VectorXd factor = (x.norms.array() > 0).select(x.left.cwiseQuotient(x.norms), 0);
+    Eigen::MatrixXd W = factor.cwiseProduct(-x.J * x.right).asDiagonal() * x.J;
+    W += factor * x.right.transpose();
     double L_bar = 0;
-    for (Eigen::Index i = 0; i < W.rows(); ++i) {
-      if (!(x.norms(i) > 0)) continue;
-      const Eigen::RowVectorXd j = x.J.row(i);
-      W.row(i) = x.left(i) / x.norms(i) * (x.right.transpose() - j.dot(x.right) * j);
-      for (int body = 1; body <= d.n; ++body) {
-        const Eigen::Index theta = layout.z(body) + 3;
-        L_bar -= x.norms(i) / x.length * W.row(i).segment<3>(theta).dot(j.segment<3>(theta));
-        W.row(i).segment<3>(theta) /= x.length;
-      }
+    const StateLayout layout{d.n};
+    for (int body = 1; body <= d.n; ++body) {
+      auto turns = W.middleCols<3>(layout.z(body) + 3);
+      L_bar -= x.norms.dot(turns.cwiseProduct(x.J.middleCols<3>(layout.z(body) + 3)).rowwise().sum()) / x.length;
+      turns /= x.length;
     }
     for (const Constraint& c : d.constraints)
-      for (int i = 0; i < c.rows(); ++i) add_row(c, i, W.row(c.row + i).transpose(), at.y, *to);
+      for (int i = 0; i < c.rows(); ++i) {
+        const auto part = [&](int body) {
+          return body > 0 ? Vec<6>(W.block<1, 6>(c.row + i, layout.z(body)).transpose()) : Vec<6>(Vec<6>::Zero());
+        };
+        add_virtual_work_gradient(c, x.bodies[at(c.body1)], x.bodies[at(c.body2)], part(c.body1), part(c.body2),
+                                  ConstraintRows::Unit(c.rows(), i), *to);
+      }
     for_each_point(
         d, [&](const Vector3d& s, int slot) { to->add_slot<3>(slot, Vec<3>(L_bar / (x.points * x.length) * s)); });
     return x.smallest;
-  }
-
- private:
-  // Adds the gradient of w'j of row i of a constraint; w is a virtual displacement of all bodies.
-  static void add_row(const Constraint& c, int i, const Eigen::VectorXd& w, const Eigen::VectorXd& y,
-                      SensorGradient& to) {
-    const auto part = [&](int body) {
-      return body > 0 ? Vec<6>(w.segment<6>(StateLayout{to.data.n}.z(body))) : Vec<6>(Vec<6>::Zero());
-    };
-    add_virtual_work_gradient(c, y, part(c.body1), part(c.body2), ConstraintRows::Unit(c.rows(), i), to);
   }
 };
 

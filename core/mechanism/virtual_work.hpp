@@ -11,10 +11,9 @@ namespace mbsopt {
 
 using ConstraintRows = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;  // of one constraint: three at most
 
-// Returns J1 eta1 + J2 eta2 without the factor.
-inline ConstraintRows add_virtual_work_gradient(const Constraint& c, const Eigen::VectorXd& y, const Vec<6>& eta1,
+// b1, b2: the bodies of c. Returns J1 eta1 + J2 eta2 without the factor.
+inline ConstraintRows add_virtual_work_gradient(const Constraint& c, BodyAt b1, BodyAt b2, const Vec<6>& eta1,
                                                 const Vec<6>& eta2, const ConstraintRows& weights, SensorGradient& to) {
-  BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
   set_virtual(eta1, b1.frame);
   set_virtual(eta2, b2.frame);
   FrameBar bar1, bar2;
