@@ -18,6 +18,7 @@ struct CostExpression::Compiled : SwitchedProgram {
   int time = 0;                 // input of t
   std::vector<int> parameters;  // used directly
   std::vector<UsedSensor> sensors;
+  bool slopes_read_sensors = false;  // whether the derivatives depend on the sensors' values
 };
 
 namespace {
@@ -60,15 +61,16 @@ class ExpressionCost : public PointCost {
 
   double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
     Scratch& s = scratch_of_this_thread();
-    set_inputs(at, s);
+    set_inputs(at, s, compiled_->slopes_read_sensors);
     for (const int i : compiled_->program.used_inputs()) s.gradient[index(i)] = 0;
     const double value = compiled_->program.add_gradient(inputs(s.x), scale, inputs(s.gradient), s.program);
     for (const int k : active_) rho_bar(k) += s.gradient[index(k)];
     for (const auto& [input, sensor] : compiled_->sensors) {
       const double weight = s.gradient[index(input)];
-      if (weight != 0) mechanism_.add_sensor_gradient(sensor, at, weight, y_bar, rho_bar);
+      if (weight != 0 || !compiled_->slopes_read_sensors)
+        s.x[index(input)] = mechanism_.add_sensor_gradient(sensor, at, weight, y_bar, rho_bar);
     }
-    return value;
+    return compiled_->slopes_read_sensors ? value : compiled_->program.value(inputs(s.x), s.program);
   }
 
   bool reads_positions() const override {
@@ -84,11 +86,12 @@ class ExpressionCost : public PointCost {
   // A thread's arrays serve any expression. A program gets as many numbers as it has inputs.
   std::span<double> inputs(std::vector<double>& x) const { return {x.data(), index(compiled_->inputs)}; }
 
-  void set_inputs(const StatePoint& at, Scratch& s) const {
+  void set_inputs(const StatePoint& at, Scratch& s, bool with_sensors = true) const {
     s.grow(compiled_->program, compiled_->inputs);
     for (const int k : compiled_->parameters) s.x[index(k)] = mechanism_.rho()(k);
     s.x[index(compiled_->time)] = at.t;
-    for (const auto& [input, sensor] : compiled_->sensors) s.x[index(input)] = mechanism_.sensor_value(sensor, at);
+    for (const auto& [input, sensor] : compiled_->sensors)
+      s.x[index(input)] = with_sensors ? mechanism_.sensor_value(sensor, at) : 0;
   }
 
   std::shared_ptr<const Compiled> compiled_;
@@ -130,6 +133,11 @@ CostExpression::CostExpression(const Expression& expression, const Scene& scene)
     if (i < compiled->time) compiled->parameters.push_back(i);
     if (i > compiled->time) compiled->sensors.push_back({i, i - compiled->time - 1});
   }
+  const auto is_sensor = [&](int input) { return input > compiled->time; };
+  if (!compiled->sensors.empty())
+    compiled->slopes_read_sensors = std::ranges::any_of(compiled->program.used_inputs(), [&](int i) {
+      return i != compiled->time && std::ranges::any_of(compiled->program.derivative(i).used_inputs(), is_sensor);
+    });
   if (compiled->program.is_constant()) {
     Program::Scratch scratch = compiled->program.scratch();
     is_zero_ = compiled->program.value({}, scratch) == 0;
