@@ -65,8 +65,12 @@ const DesignSpec& checked(const Problem& problem) {
   return spec;
 }
 
-Problem with_named_means(Problem problem) {
+// Names bounded means. Least squares takes no limits; sqp, with Gauss-Newton's matrix of the squares, does.
+Problem prepared(Problem problem) {
   name_bounded_means(problem);
+  if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares &&
+      !problem.design->subject_to.empty())
+    problem.design->optimizer.type = OptimizerSpec::kAutomatic;
   return problem;
 }
 
@@ -104,7 +108,7 @@ std::vector<std::string> objective_names(const DesignSpec& spec) {
 
 DesignProgram::DesignProgram(const Problem& problem, const DesignOptions& options, std::function<bool()> abandoned)
     : NonlinearProgram(0, 0),
-      problem_(with_named_means(problem)),
+      problem_(prepared(problem)),
       spec_(checked(problem_)),
       evaluator_(problem_, objective_names(spec_), spec_.variables, evaluator_options(spec_, options)),
       scaling_(designed(), felt_changes()),

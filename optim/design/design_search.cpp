@@ -101,6 +101,7 @@ class SingleDesign {
            std::ranges::any_of(program_.evaluator().objectives(), &Objective::is_extreme);
   }
   const std::vector<Body>& bodies() const { return program_.problem().scene.bodies; }
+  const OptimizerSpec& optimizer() const { return program_.spec().optimizer; }
   // Squares at free instants, of which least_squares alone has a Gauss-Newton matrix.
   bool has_free_squares() const {
     const Objective& minimised = program_.evaluator().of_case(0).objectives()[0];
@@ -238,7 +239,7 @@ class Searches {
     SingleDesign first(problem_, options_);
     best_ = first.run();
     note(first, "from the start", best_);
-    const OptimizerSpec& spec = problem_.design->optimizer;
+    const OptimizerSpec& spec = first.optimizer();
     if (spec.type == "sqp" || !best_.final_evaluation.ok) return ended();
     options_.compare_differences = false;
     doubts_ = first.doubts();

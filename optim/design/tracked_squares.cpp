@@ -4,12 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "core/driven/driven_simulation.hpp"
 #include "core/mechanism/scene_programs.hpp"
 #include "core/run/run_arguments.hpp"
 #include "core/simulate/simulation.hpp"
-#include "optim/solver/multipliers.hpp"
+#include "optim/solver/levenberg_marquardt.hpp"
 
 namespace mbsopt::inline optim {
 
@@ -53,10 +54,9 @@ void project_free_instants(const Objective& objective, const std::vector<Objecti
 }  // namespace
 
 TrackedSquares::TrackedSquares(const DesignProgram& program)
-    : LeastSquaresProblem(program.variables(), mbsopt::residuals(program.evaluator()) + program.constraints()),
+    : LeastSquaresProblem(program.variables(), residuals(program.evaluator())),
       program_(program),
-      evaluator_(program.evaluator()),
-      residuals_(size - program.constraints()) {
+      evaluator_(program.evaluator()) {
   x_lower = program.x_lower;
   x_upper = program.x_upper;
 }
@@ -95,23 +95,6 @@ SimulationResult TrackedSquares::with_tangents(const Mechanism& mechanism, const
   return simulate_tlm(mechanism, settings, {}, sampling, options);
 }
 
-std::vector<TrackedSquares::Taken> TrackedSquares::taken_in(std::size_t c,
-                                                            const std::vector<Objective::Instant>& instants,
-                                                            Index first, double weight) const {
-  std::vector<Taken> taken;
-  const std::vector<Objective::Sample>& rows = minimised(evaluator_, c).residuals();
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    taken.push_back({instants[i].time, &rows[i].value, first + static_cast<Index>(i), weight});
-  const Index limits = program_.constraints() / static_cast<Index>(evaluator_.cases());
-  for (Index constraint = static_cast<Index>(c) * limits; constraint < static_cast<Index>(c + 1) * limits;
-       ++constraint) {
-    for (const Objective::Sample& sample : program_.limited(constraint).samples())
-      taken.push_back({sample.time, &sample.value, residuals_ + constraint, 1 / program_.size(constraint)});
-  }
-  std::ranges::stable_sort(taken, {}, &Taken::time);
-  return taken;
-}
-
 void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
   const auto go_on = [&, &progress = evaluator_.options().progress](double t) {
     abandoned_ = abandoned_ || (progress && !progress(t));
@@ -126,15 +109,16 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     const std::vector<Objective::Sample>& rows = objective.residuals();
     const Mechanism mechanism = evaluator.mechanism(rho, true);
     const std::vector<Objective::Instant> instants = objective.instants_of(rows, mechanism, go_on);
-    const std::vector<Taken> taken = taken_in(c, instants, first, std::sqrt(weights(static_cast<Index>(c))));
+    const double factor = std::sqrt(weights(static_cast<Index>(c)));
+    std::vector<std::size_t> order(rows.size());  // by time
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return instants[i].time; });
     std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
     TangentSampling sampling;
-    std::vector<const PointCost*> costs;
-    for (const Taken& t : taken) {
-      std::shared_ptr<const PointCost>& cost = bound[t.value->id()];
-      if (!cost) cost = t.value->bind(mechanism);
-      costs.push_back(cost.get());
-      sampling.times.push_back(t.time);
+    for (const std::size_t i : order) {
+      std::shared_ptr<const PointCost>& cost = bound[rows[i].value.id()];
+      if (!cost) cost = rows[i].value.bind(mechanism);
+      sampling.times.push_back(instants[i].time);
     }
     const Index half = mechanism.states() / 2;
     VectorXd y_bar(mechanism.states()), rho_bar(rho.size()), z_t(static_cast<Index>(rows.size()));
@@ -142,13 +126,13 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
       y_bar.setZero();
       rho_bar.setZero();
-      const auto& [time, value, row, factor] = taken[k];
-      point.z(row) += factor * costs[k]->add_gradient(at, 1, y_bar, rho_bar);
+      const Index row = static_cast<Index>(order[k]);
+      point.z(first + row) = factor * bound[rows[order[k]].value.id()]->add_gradient(at, 1, y_bar, rho_bar);
       reads_velocities = reads_velocities || y_bar.tail(half).any();
-      if (row < residuals_) z_t(row - first) = factor * y_bar.head(half).dot(at.y.tail(half));
+      z_t(row) = factor * y_bar.head(half).dot(at.y.tail(half));
       for (Index j = 0; j < x.size(); ++j) {
         const int parameter = evaluator.variables()[static_cast<std::size_t>(j)];
-        point.z_x(row, j) += factor * rho_x(j) * (y_bar.dot(y_rho.col(parameter)) + rho_bar(parameter));
+        point.z_x(first + row, j) = factor * rho_x(j) * (y_bar.dot(y_rho.col(parameter)) + rho_bar(parameter));
       }
     };
     ++simulations_;
@@ -180,7 +164,7 @@ NlpResult solve_tracked_squares(DesignProgram& program, const VectorXd& x_start,
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
     return !problem.abandoned() && (!progress || progress({p.iteration, 2 * p.cost, 0, kUnknown, p.x}));
   };
-  LeastSquaresResult found = solve_within_limits(problem, program.c_lower, program.c_upper, x_start, options);
+  LeastSquaresResult found = solve_least_squares(problem, x_start, options);
   if (problem.abandoned()) {
     --found.evaluations;
     --found.failed_evaluations;
@@ -193,22 +177,17 @@ NlpResult solve_tracked_squares(DesignProgram& program, const VectorXd& x_start,
   }
   NlpResult result;
   static_cast<SolverOutcome&>(result) = found;
-  result.algorithm = program.constraints() > 0 ? "Levenberg-Marquardt within bounds, multipliers of limits"
-                                               : "Levenberg-Marquardt within bounds";
+  result.algorithm = "Levenberg-Marquardt within bounds";
   simulations += problem.simulations();
   NlpPoint& point = result.point;
-  point.c.setZero(program.constraints());
-  point.c_x.setZero(program.constraints(), program.variables());
+  point.c_x.setZero(0, program.variables());
   point.ok = found.point.z.size() == problem.size;  // not where the start could not be evaluated
   if (!point.ok) {
     point.message = found.message;
     return result;
   }
-  const Index squares = problem.residuals();
-  point.f = found.point.z.head(squares).squaredNorm();
-  point.f_x = 2 * found.point.z_x.topRows(squares).transpose() * found.point.z.head(squares);
-  point.c = found.point.z.tail(program.constraints());
-  point.c_x = found.point.z_x.bottomRows(program.constraints());
+  point.f = found.point.z.squaredNorm();
+  point.f_x = 2 * found.point.z_x.transpose() * found.point.z;
   return result;
 }
 

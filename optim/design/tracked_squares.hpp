@@ -2,8 +2,7 @@
 //
 //   z = sqrt(w_c w) (sensor(t_k) - column_k),     z_x by one tangent-linear run       w_c: weight of the load case
 //
-// so that Levenberg-Marquardt (levenberg_marquardt.hpp) takes the place of a general optimiser. Limits of `samples` of
-// the same run are further rows, in units of their size; multipliers.hpp holds them.
+// so that Levenberg-Marquardt (levenberg_marquardt.hpp) takes the place of a general optimiser.
 #pragma once
 
 #include <functional>
@@ -16,32 +15,20 @@ namespace mbsopt::inline optim {
 
 class TrackedSquares : public LeastSquaresProblem {
  public:
-  // Rows: residuals, then limits.
   explicit TrackedSquares(const DesignProgram& program);
 
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
-  Eigen::Index residuals() const { return residuals_; }
   long simulations() const { return simulations_; }
   bool abandoned() const { return abandoned_; }          // the last evaluation, by the user
   bool without_value() const { return without_value_; }  // whether a residual was not a number somewhere
 
  private:
-  struct Taken {
-    double time;
-    const CostExpression* value;
-    Eigen::Index row;
-    double factor;  // of the value in the row
-  };
-  // Lists the values that the run of case c is read for, by time: residuals, in rows from `first` on, and limits.
-  std::vector<Taken> taken_in(std::size_t c, const std::vector<Objective::Instant>& instants, Eigen::Index first,
-                              double weight) const;
   void simulate(const Eigen::VectorXd& x, LeastSquaresPoint& point);
   SimulationResult with_tangents(const Mechanism& mechanism, const SimulationSettings& settings,
                                  const TangentSampling& sampling, const RunOptions& options);
 
   const DesignProgram& program_;
   const Evaluator& evaluator_;  // of the program
-  const Eigen::Index residuals_;
   long simulations_ = 0;
   bool abandoned_ = false, without_value_ = false;
   bool is_solved_ = true;          // until a run is integrated

@@ -101,36 +101,12 @@ std::vector<SceneIssue> starts_issues(const MultistartSpec& spec, const std::vec
   return issues;
 }
 
-namespace {
-
-// Least squares computes limits with the residuals, at instants of the same run.
-std::optional<SceneIssue> limit_of_squares_issue(const Problem& problem) {
-  const std::vector<ObjectiveBound>& bounds = problem.design->subject_to;
-  for (std::size_t i = 0; i < bounds.size(); ++i) {
-    const auto objective = std::ranges::find(problem.objectives, bounds[i].objective, &ObjectiveSpec::name);
-    if (bounds[i].sampled || (objective == problem.objectives.end() && !given_kind(bounds[i].means))) continue;
-    const bool has_samples_alone = objective != problem.objectives.end() && !objective->samples.empty() &&
-                                   !objective->running && !objective->terminal && !objective->parameters_only &&
-                                   objective->track.empty();
-    if (!has_samples_alone)
-      return SceneIssue{child_path("design.subject_to", i),
-                        "bounds " + (bounds[i].objective.empty() ? "a mean" : "'" + bounds[i].objective + "'") +
-                            ", which is not made of `samples` alone; the optimizer 'least_squares' takes no other "
-                            "limits, ipopt with \"hessian\": \"gauss_newton\" does"};
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
 std::optional<SceneIssue> curvature_issue(const Problem& problem) {
   const auto is_unread = [](const TrackTerm& term) { return !term.curve; };  // a finding of the reader says why
   if (problem.design && std::ranges::any_of(problem.objectives, [&](const ObjectiveSpec& objective) {
         return std::ranges::any_of(objective.track, is_unread);
       }))
     return std::nullopt;
-  if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares)
-    if (const std::optional<SceneIssue> issue = limit_of_squares_issue(problem)) return issue;
   if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares &&
       (problem.design->minimize.empty() ||
        !objectives_of(problem, {problem.design->minimize}).front().is_sum_of_squares()))

@@ -36,9 +36,8 @@ struct LinearModel {
   VectorXd q;
   SparseMatrix R;  // with q a triangle per part, of the weighted residuals: |z + J d|^2 = |q + R d|^2 + constant
   VectorXd gradient;
-  VectorXd D;      // lengths of the columns, or more
-  VectorXd units;  // steps are measured by: D, or one length for all
-  double size;     // half the weighted sum of squares
+  VectorXd D;   // lengths of the columns, or more
+  double size;  // half the weighted sum of squares
 
   LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point)
       : LinearModel(problem, point, problem.weights(point.z).cwiseSqrt()) {}
@@ -47,7 +46,6 @@ struct LinearModel {
       : R(triangles(point, w, problem.parts)),
         gradient(R.transpose() * q),
         D(column_norms(R)),
-        units(D),
         size(0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
   double promised(const VectorXd& d) const { return 0.5 * (q.squaredNorm() - (q + R * d).squaredNorm()); }
 
@@ -98,10 +96,7 @@ SparseMatrix scaled_and_damped(const SparseMatrix& R, const VectorXd& D, double 
 class LevenbergMarquardt {
  public:
   LevenbergMarquardt(LeastSquaresProblem& problem, const LeastSquaresOptions& options)
-      : problem_(problem),
-        options_(options),
-        own_(problem.variables()),
-        learnt_(options.learnt ? *options.learnt : own_) {}
+      : problem_(problem), options_(options) {}
 
   LeastSquaresResult run(const VectorXd& x_start) {
     x_ = result_.x = x_start.cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
@@ -165,14 +160,12 @@ class LevenbergMarquardt {
     LinearModel model(problem_, point_);
     if (!report(model, 0)) return;
     first_size_ = model.size;
-    if (options_.large_residuals) equalise(model.units);
     VectorXd d = step(model, lambda_);
     while (true) {
       if (no_gradient(model) || is_short(model, d)) return converged(model, lambda_);
       if (at_limit()) return;
       ++result_.iterations;
       Trial trial = tried(model, d);
-      if (options_.large_residuals && std::isfinite(trial.cost)) choose_curvature(model, d, trial);
       const bool settled = std::abs(trial.gained) <= options_.tolerance * model.size;
       const bool accepted = std::isfinite(trial.cost) && (trial.gained > kAccepted * std::max(trial.promised, 0.0) ||
                                                           (settled && trial.gained >= 0));
@@ -201,18 +194,9 @@ class LevenbergMarquardt {
     return trial;
   }
 
-  // The learnt curvature takes part in the next steps if it foretold this cost best.
-  void choose_curvature(const LinearModel& model, const VectorXd& d, const Trial& trial) {
-    const double without = std::abs(model.promised(d) - trial.gained),
-                 with_S = std::abs(model.promised(d) - raised_by(d) - trial.gained),
-                 with_b = bend_.size() > 0 ? std::abs(trial.promised - trial.gained) : kInfinity;
-    learnt_.takes_part = with_S < std::min(without, with_b);
-  }
-
   void accept(Trial&& trial, LinearModel& model) {
     invalid_ = 0;
     missed_ = 0;
-    if (options_.large_residuals) learn(trial.x - x_, trial.point);
     x_ = trial.x;
     cost_ = trial.cost;
     point_ = std::move(trial.point);
@@ -220,8 +204,7 @@ class LevenbergMarquardt {
     lambda_ = std::max(lambda_ * std::max(1. / 3, 1 - std::pow(2 * ratio - 1, 3)), kLeastDamping);
     const VectorXd D = model.D;
     model = LinearModel(problem_, point_);
-    model.D = model.units = model.D.cwiseMax(kShrinking * D);
-    if (options_.large_residuals) equalise(model.units);
+    model.D = model.D.cwiseMax(kShrinking * D);
   }
 
   // Ends the search after a refused step from which none leads on. The error of the model's cost falls with the square
@@ -231,7 +214,7 @@ class LevenbergMarquardt {
       result_.end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
       return true;
     }
-    const double length = model.units.cwiseProduct(d).norm(), miss = std::abs(trial.promised - trial.gained);
+    const double length = model.D.cwiseProduct(d).norm(), miss = std::abs(trial.promised - trial.gained);
     if (missed_ > 0 && miss < kSimulationNoise * model.size && miss > std::sqrt(length / missed_) * missed_by_) {
       result_.end(
           SolverStatus::converged,
@@ -250,25 +233,22 @@ class LevenbergMarquardt {
     const double slope = model.gradient.dot(d);
     const double part =
         std::isfinite(trial.cost) ? std::clamp(-slope / (2 * (trial.cost - cost_ - slope)), 0.1, 0.5) : 0.25;
-    const double longest = part * model.units.cwiseProduct(d).norm();
+    const double longest = part * model.D.cwiseProduct(d).norm();
     VectorXd shorter;
     do {
       lambda_ *= 2;
       shorter = step(model, lambda_);
-    } while (model.units.cwiseProduct(shorter).norm() > longest);
+    } while (model.D.cwiseProduct(shorter).norm() > longest);
     return shorter;
   }
 
   // The weights are those of the residuals z + J d after the step (levenberg_marquardt.hpp).
-  VectorXd step(const LinearModel& model, double& lambda) {
-    bend_.resize(0);
-    if (learnt_.takes_part) return curved_step(model, lambda);
-    VectorXd d = weighed_step(model, model.units, lambda);
-    if (last_step_.size() > 0) return bent_step(model, d, lambda);
+  VectorXd step(const LinearModel& model, double lambda) const {
+    VectorXd d = weighed_step(model, model.D, lambda);
     for (int i = 0; i < kWeighings && has_weights(); ++i) {
       const VectorXd w = problem_.weights(point_.z + point_.z_x * d).cwiseSqrt();
-      const VectorXd before = std::exchange(d, weighed_step(LinearModel(problem_, point_, w), model.units, lambda));
-      if (model.units.cwiseProduct(d - before).norm() <= kWeighed * model.units.cwiseProduct(d).norm()) break;
+      const VectorXd before = std::exchange(d, weighed_step(LinearModel(problem_, point_, w), model.D, lambda));
+      if (model.D.cwiseProduct(d - before).norm() <= kWeighed * model.D.cwiseProduct(d).norm()) break;
     }
     return d;
   }
@@ -277,58 +257,7 @@ class LevenbergMarquardt {
 
   double promised_by(const LinearModel& model, const VectorXd& d) const {
     if (has_weights()) return cost_ - problem_.cost(point_.z + point_.z_x * d);
-    if (bend_.size() > 0) return cost_ - 0.5 * (point_.z + bend_ + point_.z_x * d).squaredNorm();
-    return model.promised(d) - (learnt_.takes_part ? raised_by(d) : 0);
-  }
-
-  // d'S d/2
-  double raised_by(const VectorXd& d) const { return 0.5 * d.dot(learnt_.S.matrix() * d); }
-
-  // The step with the bend of the residuals along d, which the last step showed.
-  VectorXd bent_step(const LinearModel& model, const VectorXd& d, double lambda) {
-    const VectorXd last = model.units.cwiseProduct(last_step_);
-    const double tau = last.dot(model.units.cwiseProduct(d)) / last.squaredNorm();
-    bend_ = 0.5 * tau * tau * change_;
-    LeastSquaresPoint bent = point_;
-    bent.z += bend_;
-    return weighed_step(LinearModel(problem_, bent), model.units, lambda);
-  }
-
-  // The step with J'J + S. lambda rises if the matrix of the step is not positive definite.
-  VectorXd curved_step(const LinearModel& model, double& lambda) const {
-    constexpr double kFirstRise = 1e-8, kRise = 4;  // rises that rounding of J'J does not undo
-    const VectorXd D = model.units.unaryExpr([](double length) { return length > 0 ? length : 1; });
-    const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
-    const VectorXd inverse = D.cwiseInverse();
-    MatrixXd H =
-        inverse.asDiagonal() * (MatrixXd(model.R.transpose() * model.R) + learnt_.S.matrix()) * inverse.asDiagonal();
-    H.diagonal().array() += lambda;
-    MatrixXd L = cholesky_factor(H);
-    while (L.size() == 0) {
-      const double larger = std::max(kRise * lambda, kFirstRise);
-      H.diagonal().array() += larger - lambda;
-      lambda = larger;
-      L = cholesky_factor(H);
-    }
-    const VectorXd b = -L.triangularView<Eigen::Lower>().solve(inverse.cwiseProduct(model.gradient));
-    return bounded_linear_least_squares(MatrixXd(L.transpose()), b, lower, upper).cwiseQuotient(D);
-  }
-
-  // Sets one length for all variables in units of their ranges: the smallest of their columns.
-  void equalise(VectorXd& units) const {
-    const VectorXd sizes = (problem_.x_upper - problem_.x_lower).unaryExpr([](double range) {
-      return std::isfinite(range) && range > 0 ? range : 1.0;
-    });
-    const Eigen::ArrayXd lengths = units.cwiseProduct(sizes).array();
-    const double least = (lengths > 0).select(lengths, kInfinity).minCoeff();
-    if (std::isfinite(least)) units = least * sizes.cwiseInverse();
-  }
-
-  void learn(const VectorXd& s, const LeastSquaresPoint& next) {
-    const VectorXd gradient = next.z_x.transpose() * next.z, crossed = point_.z_x.transpose() * next.z;
-    learnt_.S.add(s, gradient - point_.z_x.transpose() * point_.z, gradient - crossed);
-    last_step_ = s;
-    change_ = next.z_x * s - point_.z_x * s;
+    return model.promised(d);
   }
 
   VectorXd weighed_step(const LinearModel& model, const VectorXd& lengths, double lambda) const {
@@ -353,8 +282,8 @@ class LevenbergMarquardt {
 
   // The step is measured by its change of the residuals, so that units of the variables do not matter.
   bool is_short(const LinearModel& model, const VectorXd& d) const {
-    const double size = model.units.cwiseProduct(x_).norm() + options_.tolerance * std::sqrt(2 * model.size);
-    return model.units.cwiseProduct(d).norm() <= options_.tolerance * size;
+    const double size = model.D.cwiseProduct(x_).norm() + options_.tolerance * std::sqrt(2 * model.size);
+    return model.D.cwiseProduct(d).norm() <= options_.tolerance * size;
   }
 
   // The gradient, zero where it only presses on a bound.
@@ -409,10 +338,6 @@ class LevenbergMarquardt {
   double cost_ = 0, first_size_ = 0, lambda_ = kFirstDamping;
   int invalid_ = 0;                    // trials in a row that could not be evaluated
   double missed_ = 0, missed_by_ = 0;  // length of the step refused last at this point, and what its model missed
-  LearntCurvature own_;
-  LearntCurvature& learnt_;
-  VectorXd last_step_, change_;  // s and (J+ - J) s; empty where residuals are not large
-  VectorXd bend_;                // b of the next step; empty: it has none
 };
 
 }  // namespace

@@ -12,17 +12,6 @@
 // If the problem declares which residuals depend on which variables, each part is reduced to a triangle, and the step
 // takes their sparse QR.
 //
-// If residuals stay large (`large_residuals`), J'J is only a part of the second derivatives. The rest, S, is learnt
-// from gradients (residual_curvature.hpp). Along a curved valley the last step s, from J to J+, shows how residuals
-// bend along the next one, d:
-//   z(x + d) ~ z + b + J d,   b = tau^2/2 (J+ - J) s,   tau = s'D^2 d/s'D^2 s,   d: the step without b
-// The step minimises |z + b + J d|^2 + lambda |D d|^2, a geodesic acceleration that takes no evaluation (Transtrum and
-// Sethna, "Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares minimization",
-// arXiv:1201.5885). After each trial, the model that predicted the cost best, with S or with b, makes the next step.
-// Then lambda rises until the matrix with S is positive definite. D is then the same for all variables in units of
-// their ranges. Otherwise a residual that changes fast in one direction would lengthen all columns and damp steps
-// across that direction, too.
-//
 // With a loss, or with eliminated sigmas, the cost of the residuals is not a square. The step minimises this cost of
 // the linear residuals, by weights (LeastSquaresProblem::weights) of the residuals after the step:
 //   minimise cost(z + J d) + lambda |D d|^2/2:   d <- the step above with the weights at z + J d,   until d is settled
@@ -42,7 +31,6 @@
 #include <optional>
 
 #include "optim/solver/least_squares.hpp"
-#include "optim/solver/residual_curvature.hpp"
 
 namespace mbsopt::inline optim {
 
@@ -51,20 +39,11 @@ namespace mbsopt::inline optim {
 // it.
 inline constexpr double kSimulationNoise = 1e-4;
 
-// The knowledge of a search on large residuals. The next search on a similar problem begins with it.
-struct LearntCurvature {
-  explicit LearntCurvature(Eigen::Index variables) : S(variables) {}
-  ResidualCurvature S;
-  bool takes_part = false;  // whether S is in the model of the next step
-};
-
 struct LeastSquaresOptions {
   double tolerance = 1e-10;                                   // relative change of the cost, and of x, > 0
   int max_iterations = 100;                                   // >= 0
   std::function<bool(const LeastSquaresProgress&)> progress;  // after every iteration; false stops
   std::optional<long> max_evaluations = {};                   // > 0, that of the start counted
-  bool large_residuals = false;                               // without parts, losses and groups
-  LearntCurvature* learnt = nullptr;                          // knowledge of large residuals; null without any
 };
 
 // Moves x_start into the bounds. Never throws because of an evaluation: exceptions of evaluate() are failed
