@@ -221,14 +221,7 @@ struct ExperimentSpec {
 // that is independent between experiments only. `automatic` decides by tests of the residuals.
 enum class CovarianceType { automatic, white, newey_west, windows };
 
-struct IdentificationSpec {  // problem.cpp defines the constructors, so that they are compiled once
-  IdentificationSpec();
-  IdentificationSpec(const IdentificationSpec&);
-  IdentificationSpec(IdentificationSpec&&) noexcept;
-  IdentificationSpec& operator=(const IdentificationSpec&);
-  IdentificationSpec& operator=(IdentificationSpec&&) noexcept;
-  ~IdentificationSpec();
-
+struct IdentificationSpec {
   std::vector<ExperimentSpec> experiments;
   std::vector<std::string> variables;
   bool sigma_is_known = false;
@@ -239,14 +232,7 @@ struct IdentificationSpec {  // problem.cpp defines the constructors, so that th
   int max_iterations = 100;
 };
 
-struct Problem {  // the same
-  Problem();
-  Problem(const Problem&);
-  Problem(Problem&&) noexcept;
-  Problem& operator=(const Problem&);
-  Problem& operator=(Problem&&) noexcept;
-  ~Problem();
-
+struct Problem {
   Scene scene;
   std::vector<ObjectiveSpec> objectives;
   std::vector<CaseSpec> cases;  // load_cases.hpp
