@@ -30,88 +30,6 @@ struct Difference {
   double h = 0;
 };
 
-class Comparison {
- public:
-  explicit Comparison(const DifferenceComparison& of) : of_(of) {}
-
-  // Returns the warnings about one variable. Threads may call it at the same time for different variables.
-  std::vector<std::string> sentences(std::size_t variable);
-
- private:
-  // step: of the variable's size. Returns nullopt if f cannot be evaluated beside the start.
-  std::optional<Difference> difference(std::size_t variable, double step) const;
-  // Returns the groups whose derivatives disagree with it, with a shorter one, and by more than the integrator's error.
-  std::vector<const ComparedGroup*> disagreeing(std::size_t variable, const Difference& d);
-  double largest_derivative(const ComparedGroup& group) const;
-  bool disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d, const VectorXd* errors) const;
-  const VectorXd& integrator_errors();
-
-  const DifferenceComparison& of_;
-  std::once_flag asked_;
-  VectorXd errors_;  // of f
-};
-
-std::optional<Difference> Comparison::difference(std::size_t variable, double step) const {
-  const ComparedVariable& v = of_.variables[variable];
-  const double wanted = step * v.size;
-  const double nearer = std::min(v.below, v.above), farther = std::max(v.below, v.above);
-  Difference d;
-  if (nearer >= wanted / kShorter) {
-    d.h = std::min(wanted, nearer);
-    const std::optional<VectorXd> plus = of_.at(variable, d.h), minus = of_.at(variable, -d.h);
-    if (!plus || !minus) return std::nullopt;
-    d.slope = (*plus - *minus) / (2 * d.h);
-    d.bend = (*plus - 2 * of_.f + *minus).cwiseAbs() / (2 * d.h);
-    return d;
-  }
-  // On a bound, the difference goes away from it: (4 f(h/2) - f(h) - 3 f(0))/h.
-  d.h = std::min(wanted, farther);
-  const double h = v.above >= v.below ? d.h : -d.h;
-  const std::optional<VectorXd> half = of_.at(variable, h / 2), whole = of_.at(variable, h);
-  if (!half || !whole) return std::nullopt;
-  d.slope = (4 * *half - *whole - 3 * of_.f) / h;
-  d.bend = (*whole - 2 * *half + of_.f).cwiseAbs() / (0.5 * d.h);
-  return d;
-}
-
-double Comparison::largest_derivative(const ComparedGroup& group) const {
-  double largest = 0;
-  for (std::size_t k = 0; k < of_.variables.size(); ++k)
-    largest = std::max(largest, of_.variables[k].size * rows(of_.f_rho.col(static_cast<Index>(k)), group).norm());
-  return largest;
-}
-
-bool Comparison::disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d,
-                           const VectorXd* errors) const {
-  const auto size = [&](const auto& x) { return rows(x, group).norm(); };
-  const Index k = static_cast<Index>(variable);
-  double allowed = std::max({kApart * size(of_.f_rho.col(k)), kApart * size(d.slope), size(d.bend),
-                             kMatters * largest_derivative(group) / of_.variables[variable].size});
-  if (errors) allowed += kTrust * size(*errors) / d.h;
-  return size(VectorXd(d.slope - of_.f_rho.col(k))) > allowed;
-}
-
-const VectorXd& Comparison::integrator_errors() {
-  std::call_once(asked_, [&] {
-    errors_.setZero(of_.f.size());
-    const std::optional<VectorXd> f = of_.tighter ? of_.tighter() : std::nullopt;
-    if (f && f->size() == of_.f.size()) errors_ = (*f - of_.f).cwiseAbs();
-  });
-  return errors_;
-}
-
-std::vector<const ComparedGroup*> Comparison::disagreeing(std::size_t variable, const Difference& d) {
-  std::vector<const ComparedGroup*> found;
-  std::optional<Difference> shorter;
-  for (const ComparedGroup& group : of_.groups) {
-    if (!disagrees(group, variable, d, nullptr)) continue;
-    if (!shorter) shorter = difference(variable, kStep / kShorter);
-    if (!shorter || !disagrees(group, variable, *shorter, nullptr)) continue;
-    if (disagrees(group, variable, d, &integrator_errors())) found.push_back(&group);
-  }
-  return found;
-}
-
 std::string in_words(const ComparedGroup& group, const std::string& variable, const VectorXd& exact,
                      const VectorXd& slope, double h) {
   const bool one = group.rows == 1;
@@ -123,23 +41,80 @@ std::string in_words(const ComparedGroup& group, const std::string& variable, co
       one ? "" : fmt::format(" (apart by {:.6g})", (slope - exact).norm()));
 }
 
-std::vector<std::string> Comparison::sentences(std::size_t variable) {
-  const auto abandoned = [this] { return of_.go_on && !of_.go_on(); };
-  const ComparedVariable& v = of_.variables[variable];
-  if (abandoned() || !(std::max(v.below, v.above) > 0)) return {};  // its bounds leave it where it is
-  std::optional<Difference> d = difference(variable, kStep);
-  if (!d) d = difference(variable, kStep / kShorter);
-  if (abandoned()) return {};
-  if (!d)
-    return {fmt::format(
-        "the derivatives in '{}' were not compared with a difference: next to the start it cannot be evaluated",
-        v.name)};
-  std::vector<std::string> said;
-  for (const ComparedGroup* group : disagreeing(variable, *d))
-    said.push_back(in_words(*group, v.name, rows(of_.f_rho.col(static_cast<Index>(variable)), *group),
-                            rows(d->slope, *group), d->h));
-  return said;
-}
+class Comparison {
+ public:
+  explicit Comparison(const DifferenceComparison& of) : of_(of) {}
+
+  // Returns the warnings about one variable. Threads may call it at the same time for different variables.
+  std::vector<std::string> sentences(std::size_t variable) {
+    const auto abandoned = [this] { return of_.go_on && !of_.go_on(); };
+    const ComparedVariable& v = of_.variables[variable];
+    if (abandoned() || !(std::max(v.below, v.above) > 0)) return {};  // its bounds leave it where it is
+    std::optional<Difference> d = difference(variable, kStep), shorter;
+    if (!d) d = difference(variable, kStep / kShorter);
+    if (abandoned()) return {};
+    if (!d)
+      return {fmt::format(
+          "the derivatives in '{}' were not compared with a difference: next to the start it cannot be evaluated",
+          v.name)};
+    std::vector<std::string> said;
+    for (const ComparedGroup& group : of_.groups) {
+      if (!disagrees(group, variable, *d, nullptr)) continue;
+      if (!shorter) shorter = difference(variable, kStep / kShorter);
+      if (!shorter || !disagrees(group, variable, *shorter, nullptr)) continue;
+      if (disagrees(group, variable, *d, &integrator_errors()))
+        said.push_back(in_words(group, v.name, rows(of_.f_rho.col(static_cast<Index>(variable)), group),
+                                rows(d->slope, group), d->h));
+    }
+    return said;
+  }
+
+ private:
+  // step: of the variable's size. Returns nullopt if f cannot be evaluated beside the start.
+  std::optional<Difference> difference(std::size_t variable, double step) const {
+    const ComparedVariable& v = of_.variables[variable];
+    const double wanted = step * v.size;
+    const double nearer = std::min(v.below, v.above), farther = std::max(v.below, v.above);
+    if (nearer >= wanted / kShorter) {
+      const double h = std::min(wanted, nearer);
+      const std::optional<VectorXd> plus = of_.at(variable, h), minus = of_.at(variable, -h);
+      if (!plus || !minus) return std::nullopt;
+      return Difference{(*plus - *minus) / (2 * h), (*plus - 2 * of_.f + *minus).cwiseAbs() / (2 * h), h};
+    }
+    // On a bound, the difference goes away from it: (4 f(h/2) - f(h) - 3 f(0))/h.
+    const double size = std::min(wanted, farther), h = v.above >= v.below ? size : -size;
+    const std::optional<VectorXd> half = of_.at(variable, h / 2), whole = of_.at(variable, h);
+    if (!half || !whole) return std::nullopt;
+    return Difference{(4 * *half - *whole - 3 * of_.f) / h, (*whole - 2 * *half + of_.f).cwiseAbs() / (0.5 * size),
+                      size};
+  }
+
+  // errors: of f by the integrator, if they count.
+  bool disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d, const VectorXd* errors) const {
+    const auto size = [&](const VectorXd& x) { return rows(x, group).norm(); };
+    double largest = 0;  // derivative of the group
+    for (std::size_t k = 0; k < of_.variables.size(); ++k)
+      largest = std::max(largest, of_.variables[k].size * size(of_.f_rho.col(static_cast<Index>(k))));
+    const VectorXd exact = of_.f_rho.col(static_cast<Index>(variable));
+    double allowed = std::max({kApart * size(exact), kApart * size(d.slope), size(d.bend),
+                               kMatters * largest / of_.variables[variable].size});
+    if (errors) allowed += kTrust * size(*errors) / d.h;
+    return size(d.slope - exact) > allowed;
+  }
+
+  const VectorXd& integrator_errors() {
+    std::call_once(asked_, [&] {
+      errors_.setZero(of_.f.size());
+      const std::optional<VectorXd> f = of_.tighter ? of_.tighter() : std::nullopt;
+      if (f && f->size() == of_.f.size()) errors_ = (*f - of_.f).cwiseAbs();
+    });
+    return errors_;
+  }
+
+  const DifferenceComparison& of_;
+  std::once_flag asked_;
+  VectorXd errors_;  // of f
+};
 
 }  // namespace
 
