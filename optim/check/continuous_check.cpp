@@ -26,16 +26,10 @@ class ContinuousComparison {
     const Method* method_of_file = runge_kutta_method(given.type);
     stiff_ = given.type == "cvodes_bdf" || (method_of_file && method_of_file->implicit());
     result_.discrete = method_of_file && method_of_file->adaptive ? given.type : stiff_ ? "radau5" : "dopri853";
-    if (!scene_.simulation.events.empty()) {
-      result_.message = "CVODES does not end steps at simulation.events";
-      return std::move(result_);
-    }
-    const auto simulated = [](const Objective& o) { return o.needs_simulation(); };
-    const auto count = static_cast<std::size_t>(std::count_if(objectives_.begin(), objectives_.end(), simulated));
-    if (count == 0) {
-      result_.message = "nothing is simulated";
-      return std::move(result_);
-    }
+    const auto count = static_cast<std::size_t>(std::ranges::count_if(objectives_, &Objective::needs_simulation));
+    if (count == 0) result_.message = "nothing is simulated";
+    if (!scene_.simulation.events.empty()) result_.message = "CVODES does not end steps at simulation.events";
+    if (!result_.message.empty()) return std::move(result_);
     const GradientCost cost = gradient_cost(evaluator_.variables().size(), count);
     forward_ = cost.tlm <= cost.adjoint;
     Evaluation continuous;
@@ -115,11 +109,12 @@ class ContinuousComparison {
     for (Index i = 0; i < discrete.rows(); ++i) {
       const double largest = discrete.row(i).cwiseAbs().cwiseProduct(size.transpose()).maxCoeff();
       for (Index k = 0; k < discrete.cols(); ++k) {
-        ContinuousEntry e;
-        e.objective = objectives_[static_cast<std::size_t>(i)].name();
-        e.parameter = evaluator_.variable(k).name;
-        e.discrete = discrete(i, k);
-        e.continuous = continuous(i, k);
+        ContinuousEntry e{objectives_[static_cast<std::size_t>(i)].name(),
+                          evaluator_.variable(k).name,
+                          i,
+                          k,
+                          discrete(i, k),
+                          continuous(i, k)};
         const double entry =
             std::max({std::abs(e.discrete), std::abs(e.continuous), options_.floor * largest / size(k)});
         const double apart = std::abs(e.continuous - e.discrete);
@@ -145,9 +140,7 @@ class ContinuousComparison {
 
 }  // namespace
 
-bool ContinuousCheck::passed() const {
-  return std::all_of(entries.begin(), entries.end(), [](const ContinuousEntry& e) { return passes(e.verdict); });
-}
+bool ContinuousCheck::passed() const { return std::ranges::all_of(entries, passes, &ContinuousEntry::verdict); }
 
 double ContinuousCheck::worst_difference(const std::string& objective) const {
   double worst = 0;

@@ -17,6 +17,7 @@ namespace mbsopt::inline optim {
 
 struct ContinuousEntry {
   std::string objective, parameter;
+  Eigen::Index row = 0, column = 0;  // of the gradients
   double discrete = 0, continuous = 0;
   double difference = 0;  // relative to the entry, or to `floor` times the gradient's size
   Verdict verdict = Verdict::disagrees;

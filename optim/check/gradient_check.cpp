@@ -23,16 +23,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+bool failed(const std::optional<Verdict>& verdict) { return verdict && !passes(*verdict); }
+
 // Returns whether the methods agree. Wrong terms of a user do not count here.
 bool agree(const GradientCheck& check) {
-  auto fine = [](const CheckedEntry& e) {
-    return passes(e.exact) && (!e.frozen_verdict || passes(*e.frozen_verdict)) &&
-           (!e.free_verdict || passes(*e.free_verdict));
+  const auto fine = [](const CheckedEntry& e) {
+    return passes(e.exact) && !failed(e.frozen_verdict) && !failed(e.free_verdict);
   };
-  auto held = [](const auto& c) { return c.passed; };
-  return check.ran && std::all_of(check.entries.begin(), check.entries.end(), fine) &&
-         std::all_of(check.taylor.begin(), check.taylor.end(), held) &&
-         std::all_of(check.identities.begin(), check.identities.end(), held) &&
+  return check.ran && std::ranges::all_of(check.entries, fine) &&
+         std::ranges::all_of(check.taylor, &TaylorCheck::passed) &&
+         std::ranges::all_of(check.identities, &IdentityCheck::passed) &&
          (!check.continuous || check.continuous->passed());
 }
 
@@ -88,15 +88,13 @@ class Check {
 
  private:
   bool base_runs() {
-    for (Evaluation* const e : {&tlm_, &adjoint_}) {
-      const GradientMethod method = e == &tlm_ ? GradientMethod::tlm : GradientMethod::adjoint;
-      *e = run_.counted(run_.evaluator.in(scene_, method).gradients(run_.rho));
-      result_.statistics = e->statistics;
-      result_.warnings = e->warnings;
-      if (!e->ok) {
-        result_.message = e->message;
-        return false;
-      }
+    for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
+      Evaluation& e = method == GradientMethod::tlm ? tlm_ : adjoint_;
+      e = run_.counted(run_.evaluator.in(scene_, method).gradients(run_.rho));
+      result_.statistics = e.statistics;
+      result_.warnings = e.warnings;
+      result_.message = e.message;
+      if (!e.ok) return false;
     }
     result_.tlm = tlm_.psi_rho;
     result_.adjoint = adjoint_.psi_rho;
@@ -164,11 +162,8 @@ class Check {
     for (Index k = 0; k < run_.rho.size(); ++k) {
       for (const bool frozen : {true, false}) {
         std::vector<Index> disagreeing;
-        for (Index i = 0; i < result_.psi.size(); ++i) {
-          const CheckedEntry& e = result_.entries[static_cast<std::size_t>(i * run_.rho.size() + k)];
-          const std::optional<Verdict>& verdict = frozen ? e.frozen_verdict : e.free_verdict;
-          if (verdict && !passes(*verdict)) disagreeing.push_back(i);
-        }
+        for (const CheckedEntry& e : result_.entries)
+          if (e.column == k && failed(frozen ? e.frozen_verdict : e.free_verdict)) disagreeing.push_back(e.row);
         if (differences_->take_finer(k, frozen, disagreeing, rounding_.psi)) found = true;
       }
     }
@@ -210,14 +205,10 @@ class Check {
     if (check.passed() || !result_.discrete) return;
     if (!rounding_known_) measure_rounding();
     const MatrixXd rounding = rounding_.psi_rho.cwiseMax((result_.tlm - result_.adjoint).cwiseAbs());
-    for (std::size_t n = 0; n < check.entries.size(); ++n) {
-      ContinuousEntry& e = check.entries[n];
-      const Index at = static_cast<Index>(n), P = run_.rho.size();
-      const double entry = std::max(std::abs(e.discrete), std::abs(e.continuous));
+    for (ContinuousEntry& e : check.entries)
       if (!passes(e.verdict))
-        e.verdict =
-            verdict_of(e.continuous, rounding(at / P, at % P), e.discrete, entry, options_.thresholds.continuous);
-    }
+        e.verdict = verdict_of(e.continuous, rounding(e.row, e.column), e.discrete,
+                               std::max(std::abs(e.discrete), std::abs(e.continuous)), options_.thresholds.continuous);
   }
 
   // Warns if rounding of the exact derivatives exceeds what methods may differ by.
@@ -225,44 +216,36 @@ class Check {
     const FormulationSettings& f = scene_.simulation.formulation;
     const bool by_penalty = f.type == FormulationType::penalty && f.linear_solver == LinearSolver::cholesky;
     double worst = by_penalty ? options_.thresholds.tlm_adjoint : options_.thresholds.frozen;
-    Index objective = -1, parameter = -1;
-    for (Index i = 0; i < rounding_.psi_rho.rows(); ++i)
-      for (Index k = 0; k < rounding_.psi_rho.cols(); ++k)
-        if (const double entry = std::abs(result_.tlm(i, k)); entry > 0)
-          if (const double part = rounding_.psi_rho(i, k) / std::max(entry, floor_of(i, k)); part > worst)
-            worst = part, objective = i, parameter = k;
-    if (objective < 0) return;
+    const CheckedEntry* of = nullptr;
+    for (const CheckedEntry& e : result_.entries) {
+      const double entry = std::abs(e.tlm);
+      const double part = rounding_.psi_rho(e.row, e.column) / std::max(entry, floor_of(e.row, e.column));
+      if (entry > 0 && part > worst) worst = part, of = &e;
+    }
+    if (!of) return;
     result_.warnings.push_back(
         by_penalty
             ? fmt::format("simulation.formulation: penalty with alpha {:.3g} by cholesky rounds derivatives by up to "
                           "{:.1g} of them, which is more than methods may differ by; \"linear_solver\": "
                           "\"quasidefinite\" has no such rounding",
                           f.alpha, worst)
-            : fmt::format(
-                  "rounding changes the exact derivative of {} in {} by about {:.1g} of it, which is more than it "
-                  "may differ from differences: its terms differ by many powers of ten",
-                  result_.objectives[static_cast<std::size_t>(objective)],
-                  result_.parameters[static_cast<std::size_t>(parameter)], worst));
+            : fmt::format("rounding changes the exact derivative of {} in {} by about {:.1g} of it, which is more than "
+                          "it may differ from differences: its terms differ by many powers of ten",
+                          of->objective, of->parameter, worst));
   }
 
   void say_kinks() {
-    for (std::size_t n = 0; n < result_.entries.size(); ++n) {
-      const CheckedEntry& e = result_.entries[n];
-      const Index i = static_cast<Index>(n) / run_.rho.size(), k = static_cast<Index>(n) % run_.rho.size();
-      const auto failed = [](const std::optional<Verdict>& v) { return v && !passes(*v); };
+    for (const CheckedEntry& e : result_.entries) {
       const bool frozen = failed(e.frozen_verdict);
       if (!frozen && !failed(e.free_verdict)) continue;
-      const double s = frozen ? e.frozen : e.free, b = differences_->kink(i, k, frozen, rounding_.psi(i));
+      const double s = frozen ? e.frozen : e.free;
+      const double b = differences_->kink(e.row, e.column, frozen, rounding_.psi(e.row));
       if (!(std::abs(e.tlm - s) <= std::abs(b) / kKinkFalls)) continue;
       result_.warnings.push_back(fmt::format(
           "{} is not smooth in {}: its slope is {:.6g} below the value and {:.6g} above it, as at a norm or "
           "an absolute value that is zero. There is no derivative",
           e.objective, e.parameter, s - b, s + b));
     }
-  }
-
-  bool has_kinks() const {
-    return std::ranges::any_of(result_.statistics.jumps, [](const Jump& jump) { return jump.size == 0; });
   }
 
   // Entries of an objective below this size are compared with it.
@@ -274,14 +257,15 @@ class Check {
   void compare() {
     result_.entries.clear();
     const CheckThresholds& limits = options_.thresholds;
+    const bool has_kinks =
+        std::ranges::any_of(result_.statistics.jumps, [](const Jump& jump) { return jump.size == 0; });
     const GradientDifferences::Table &on_frozen = differences_->of(true), &on_free = differences_->of(false);
     result_.frozen = on_frozen.derivative;
     result_.free = on_free.derivative;
     for (Index i = 0; i < result_.psi.size(); ++i) {
       for (Index k = 0; k < run_.rho.size(); ++k) {
-        CheckedEntry e;
-        e.objective = result_.objectives[static_cast<std::size_t>(i)];
-        e.parameter = result_.parameters[static_cast<std::size_t>(k)];
+        CheckedEntry e{result_.objectives[static_cast<std::size_t>(i)], result_.parameters[static_cast<std::size_t>(k)],
+                       i, k};
         e.tlm = result_.tlm(i, k);
         e.adjoint = result_.adjoint(i, k);
         e.frozen = result_.frozen(i, k);
@@ -310,7 +294,7 @@ class Check {
                                limits.continuous);
         }
         // Where steps cross kinks, rounding may take another branch; this is no error of differences.
-        const double branch = has_kinks() ? std::max(0.0, rounding_.psi_rho(i, k) - excused_(i, k)) : 0;
+        const double branch = has_kinks ? std::max(0.0, rounding_.psi_rho(i, k) - excused_(i, k)) : 0;
         e.free_error += rounding(on_free.step) - branch;
         if (options_.free_steps) e.free_verdict = verdict_of(e.free, e.free_error, e.tlm, entry, limits.free);
         e.rungs = differences_->rungs(i, k);
@@ -359,11 +343,9 @@ class Check {
     constexpr int kDirections = 3;
     result_.identities.clear();
     for (int i = 0; i < kDirections; ++i) {
-      const VectorXd d = random_direction(run_.rho.size()).cwiseProduct(run_.size);
-      const VectorXd w = random_direction(result_.psi.size());
       IdentityCheck check;
-      check.d = d;
-      check.w = w;
+      const VectorXd& d = check.d = random_direction(run_.rho.size()).cwiseProduct(run_.size);
+      const VectorXd& w = check.w = random_direction(result_.psi.size());
       check.tlm = w.dot(result_.tlm * d);
       check.adjoint = (result_.adjoint.transpose() * w).dot(d);
       const double terms = w.cwiseAbs().dot(result_.tlm.cwiseAbs() * d.cwiseAbs());

@@ -52,16 +52,17 @@ struct CheckThresholds {
 
 struct CheckedEntry {
   std::string objective, parameter;
+  Eigen::Index row = 0, column = 0;  // of the gradients
   double tlm = 0, adjoint = 0;
-  double frozen = 0, frozen_error = 0;    // derivative and its estimated error; NaN, infinite where it failed
-  double free = 0, free_error = 0;        // the error with that of the integration
-  double tlm_adjoint = 0;                 // relative difference
-  double frozen_difference = 0;           // |frozen - tlm| relative to the entry
-  double free_difference = 0;             // |free - tlm| relative to the entry
-  Verdict exact = Verdict::disagrees;     // TLM against adjoint
-  std::optional<Verdict> frozen_verdict;  // set if steps can be frozen
-  std::optional<Verdict> free_verdict;    // set if free differences were requested
-  std::vector<LadderRung> rungs;          // h falling
+  double frozen = 0, frozen_error = 0;         // derivative and its estimated error; NaN, infinite where it failed
+  double free = 0, free_error = 0;             // the error with that of the integration
+  double tlm_adjoint = 0;                      // relative difference
+  double frozen_difference = 0;                // |frozen - tlm| relative to the entry
+  double free_difference = 0;                  // |free - tlm| relative to the entry
+  Verdict exact = Verdict::disagrees;          // TLM against adjoint
+  std::optional<Verdict> frozen_verdict = {};  // set if steps can be frozen
+  std::optional<Verdict> free_verdict = {};    // set if free differences were requested
+  std::vector<LadderRung> rungs = {};          // h falling
 };
 
 struct IdentityCheck {

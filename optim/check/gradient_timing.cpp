@@ -5,21 +5,6 @@
 #include "optim/objective/evaluator.hpp"
 
 namespace mbsopt::inline optim {
-namespace {
-
-// Seconds of one method, and their ratios to the simulations of the same rounds.
-struct Rounds {
-  std::vector<double> seconds, ratios;
-
-  void add(double of_this, double of_simulation) {
-    seconds.push_back(of_this);
-    ratios.push_back(of_simulation > 0 ? of_this / of_simulation : 0);
-  }
-  MethodCost cost() const { return {median(seconds), median(ratios)}; }
-};
-
-}  // namespace
-
 GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& objectives,
                               const GradientTimingOptions& options) {
   GradientTiming timing;
@@ -38,7 +23,6 @@ GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& 
     }
     return e.wall_seconds;
   };
-  Rounds simulation, tlm, adjoint;
   const Stopwatch stopwatch;
   const auto more = [&] {
     if (timing.rounds == 0) return true;
@@ -46,16 +30,19 @@ GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& 
     if (timing.rounds >= options.most_rounds || seconds > options.most_seconds) return false;
     return timing.rounds < options.least_rounds || seconds < options.least_seconds;
   };
+  constexpr GradientMethod kMethods[] = {GradientMethod::automatic, GradientMethod::adjoint, GradientMethod::tlm};
+  std::vector<double> seconds[3], ratios[3];  // of each, and to the simulation of the same round
   for (; more(); ++timing.rounds) {
-    const double one = timed(GradientMethod::automatic);
-    simulation.add(one, one);
-    if (timing.ok) adjoint.add(timed(GradientMethod::adjoint), one);
-    if (timing.ok) tlm.add(timed(GradientMethod::tlm), one);
-    if (!timing.ok) return timing;
+    for (std::size_t k = 0; k < 3; ++k) {
+      seconds[k].push_back(timed(kMethods[k]));
+      if (!timing.ok) return timing;
+      const double one = seconds[0].back();
+      ratios[k].push_back(one > 0 ? seconds[k].back() / one : 0);
+    }
   }
-  timing.simulation = simulation.cost();
-  timing.adjoint = adjoint.cost();
-  timing.tlm = tlm.cost();
+  timing.simulation = {median(seconds[0]), median(ratios[0])};
+  timing.adjoint = {median(seconds[1]), median(ratios[1])};
+  timing.tlm = {median(seconds[2]), median(ratios[2])};
   return timing;
 }
 

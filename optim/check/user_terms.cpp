@@ -52,22 +52,17 @@ std::vector<Direction> directions(const VectorXd& q, const VectorXd& v, const st
     const Index at = layout.q(++number);
     const Vector4d p = q.segment<4>(at + 3), pdot = v.segment<4>(at + 3);
     for (int axis = 0; axis < 3; ++axis) {
-      Direction d{VectorXd::Zero(q.size()), VectorXd::Zero(q.size()), false, false, ""};
-      d.q(at + axis) = 1;
-      d.name = fmt::format("{} of '{}'", kAxes[axis], body);
-      all.push_back(d);
-      d.q(at + axis) = 0;
-      d.v(at + axis) = 1;
-      d.of_rates = true;
-      d.name = fmt::format("the rate of {}", d.name);
-      all.push_back(d);
-      d.v(at + axis) = 0, d.v.segment<4>(at + 3) = turned(p, axis), d.turns = true;
-      d.name = fmt::format("the angular velocity of '{}' about its {}", body, kAxes[axis]);
-      all.push_back(d);
-      d.q.segment<4>(at + 3) = turned(p, axis), d.v.segment<4>(at + 3) = -d.q.segment<4>(at + 3).dot(pdot) * p;
-      d.of_rates = false;
-      d.name = fmt::format("a turn of '{}' about its {}", body, kAxes[axis]);
-      all.push_back(d);
+      const VectorXd none = VectorXd::Zero(q.size());
+      VectorXd move = none, turn = none, rate_of_turn = none;
+      move(at + axis) = 1;
+      turn.segment<4>(at + 3) = turned(p, axis);
+      rate_of_turn.segment<4>(at + 3) = -turn.segment<4>(at + 3).dot(pdot) * p;
+      const std::string place = fmt::format("{} of '{}'", kAxes[axis], body);
+      all.push_back({move, none, false, false, place});
+      all.push_back({none, move, true, false, "the rate of " + place});
+      all.push_back(
+          {none, turn, true, true, fmt::format("the angular velocity of '{}' about its {}", body, kAxes[axis])});
+      all.push_back({turn, rate_of_turn, false, true, fmt::format("a turn of '{}' about its {}", body, kAxes[axis])});
     }
   }
   return all;
@@ -246,30 +241,25 @@ class UserTerms {
   }
 
   void check_objective(const Objective& objective, double t, const VectorXd& y, const VectorXd& angles, bool end) {
-    const Cost cost = objective.cost(mechanism_);
     const std::string name = "objective '" + objective.name() + "': its ";
-    if (cost.running)
-      check_cost(
-          name + "running", *cost.running, [&](const Mechanism& m) { return objective.cost(m).running; }, t, y, angles);
-    if (cost.terminal && end)
-      check_cost(
-          name + "terminal", *cost.terminal, [&](const Mechanism& m) { return objective.cost(m).terminal; }, t, y,
-          angles);
+    check_cost(objective, &Cost::running, name + "running", t, y, angles);
+    if (end) check_cost(objective, &Cost::terminal, name + "terminal", t, y, angles);
   }
 
-  template <class Bound>
-  void check_cost(const std::string& name, const PointCost& cost, const Bound& bound, double t, const VectorXd& y,
-                  const VectorXd& angles) {
+  void check_cost(const Objective& objective, std::shared_ptr<const PointCost> Cost::*part, const std::string& name,
+                  double t, const VectorXd& y, const VectorXd& angles) {
+    const std::shared_ptr<const PointCost> cost = objective.cost(mechanism_).*part;
+    if (!cost) return;
     const Index n = y.size() / 2;
     std::vector<std::string> bodies;
     for (const Body& body : scene_.bodies) bodies.push_back(body.name);
     VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(rho_.size());
-    cost.add_gradient({t, y, angles}, 1, y_bar, rho_bar);
+    cost->add_gradient({t, y, angles}, 1, y_bar, rho_bar);
     const auto f = [&](const Mechanism& there, const VectorXd&, const VectorXd& q, const VectorXd& v) {
       VectorXd y_there(y.size());
       y_there << q, v;
-      return VectorXd::Constant(
-          1, &there == &mechanism_ ? cost.value({t, y_there, angles}) : bound(there)->value({t, y_there, angles}));
+      const auto bound = &there == &mechanism_ ? cost : objective.cost(there).*part;
+      return VectorXd::Constant(1, bound->value({t, y_there, angles}));
     };
     const std::string in_y = name + " cost's gradient in y", in_rho = name + " cost's gradient in rho";
     compare_all({in_y, in_y, in_rho, f}, t, y.head(n), y.tail(n), bodies, y_bar.head(n).transpose(),
