@@ -40,20 +40,16 @@ std::optional<Scene> with_other_tolerances(Scene scene, long steps) {
   return with_errors_times(factor, std::move(scene), steps);
 }
 
-IntegrationError integration_error(const Evaluator& evaluator, const Evaluation& at, GradientMethod method,
-                                   bool fixed_steps) {
-  IntegrationError error;
-  error.psi.setZero(at.psi.size());
-  error.psi_rho.setZero(at.psi_rho.rows(), at.psi_rho.cols());
-  const IntegratorSettings& given = evaluator.scene().simulation.integrator;
-  if (given.step && !fixed_steps) return error;
-  if (!given.step) error.psi_rho = given.rtol * at.psi_rho.cwiseAbs();
-  const double factor = given.step ? 0.1 : other_errors(given);
-  Evaluator other = evaluator.in(with_errors_times(factor, evaluator.scene(), at.statistics.steps), method);
-  const Evaluation e = other.gradients(at.rho);
+IntegrationError integration_error(const Evaluator& evaluator, const Evaluation& at, GradientMethod method) {
+  IntegrationError error{Eigen::VectorXd::Zero(at.psi.size()),
+                         Eigen::MatrixXd::Zero(at.psi_rho.rows(), at.psi_rho.cols())};
+  const std::optional<Scene> scene = with_other_tolerances(evaluator.scene(), at.statistics.steps);
+  if (!scene) return error;
+  error.psi_rho = evaluator.scene().simulation.integrator.rtol * at.psi_rho.cwiseAbs();
+  const Evaluation e = evaluator.in(*scene, method).gradients(at.rho);
   error.simulations = e.simulations;
   if (!e.ok) return error;
-  error.psi = error.psi.cwiseMax((e.psi - at.psi).cwiseAbs());
+  error.psi = (e.psi - at.psi).cwiseAbs();
   error.psi_rho = error.psi_rho.cwiseMax((e.psi_rho - at.psi_rho).cwiseAbs());
   return error;
 }

@@ -1,6 +1,6 @@
 // The integrator's error in psi and its derivatives. It is their change by ten times tighter tolerances, or looser ones
 // if those are out of reach. For derivatives it is at least rtol times them. It estimates the size and is no bound.
-// Fixed steps do not jump from run to run: the error is then zero, unless requested.
+// Fixed steps do not jump from run to run: the error is then zero.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,9 +28,9 @@ Scene with_errors_times(double factor, Scene scene, long steps = 0);
 // The scene with ten times tighter tolerances, or looser ones; none if its steps are fixed.
 std::optional<Scene> with_other_tolerances(Scene scene, long steps = 0);
 
-// Of an evaluation with gradients, by a method of the caller's choice. fixed_steps: estimate their error, too.
+// Of an evaluation with gradients, by a method of the caller's choice.
 IntegrationError integration_error(const Evaluator& evaluator, const Evaluation& at,
-                                   GradientMethod method = GradientMethod::automatic, bool fixed_steps = false);
+                                   GradientMethod method = GradientMethod::automatic);
 
 // Returns whether the estimates of every run allow that a gradient is off by more than kResolved. The estimates are
 // those of its integrals, and rtol times the motion's magnification of a change of parameters. The gradient of an rms
