@@ -20,15 +20,8 @@ namespace {
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
 std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-std::string lower_case(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return result;
+  const std::size_t first = std::min(text.find_first_not_of(" \t"), text.size());
+  return text.substr(first, text.find_last_not_of(" \t") + 1 - first);
 }
 
 struct Cell {
@@ -190,52 +183,46 @@ class Reader {
   // An empty cell, and the words of programs for "no number": nan, -nan, nan(ind), NA.
   static bool is_missing(std::string_view text) {
     if (!text.empty() && (text.front() == '-' || text.front() == '+')) text.remove_prefix(1);
-    const std::string word = lower_case(text);
+    std::string word(text);
+    std::ranges::transform(word, word.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
     return word.empty() || word == "nan" || word == "na" || word == "n/a" || word.starts_with("nan(");
   }
 
-  // The number of a cell, or NaN. A column keeps its first fault, which matters only if the column is used.
+  // The number of a cell, or NaN. A column keeps its first fault, which matters only if the column is used. The first
+  // point or comma between digits decides for all numbers of the file.
   double number(const Cell& cell, std::size_t k) {
-    if (table_.faults[k].empty() && !is_missing(cell.text)) {
-      try {
-        return number(cell, table_.header[k]);
-      } catch (const CsvError& error) {
-        table_.faults[k] = error.what();
-      }
-    }
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-
-  // The first point or comma between digits decides for all numbers of the file.
-  double number(const Cell& cell, const std::string& column) {
+    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+    if (!table_.faults[k].empty() || is_missing(cell.text)) return kNaN;
     const auto refuse = [&](const std::string& why) {
-      fail(cell.column, fmt::format("column '{}': '{}' {}", column, cell.text, why));
+      table_.faults[k] = at(cell.column, fmt::format("column '{}': '{}' {}", table_.header[k], cell.text, why));
+      return kNaN;
     };
     std::string text = cell.text;
     const std::size_t mark = text.find_first_of(".,");
     if (mark != std::string::npos && text.find_first_of(".,", mark + 1) != std::string::npos)
-      refuse("has more than one point or comma; thousands are not separated");
+      return refuse("has more than one point or comma; thousands are not separated");
     const char found = mark == std::string::npos ? '\0' : text[mark];
     if (found) text[mark] = '.';
     double value = 0;
-    if (!is_number(text, value) || !std::isfinite(value)) refuse("is not a finite number");
+    if (!is_number(text, value) || !std::isfinite(value)) return refuse("is not a finite number");
     if (found == ',' && delimiter_ == ',')
-      refuse("has a decimal comma, which needs a semicolon or a tab between cells");
+      return refuse("has a decimal comma, which needs a semicolon or a tab between cells");
     if (found && decimal_ == 0) {
       decimal_ = found;
       decimal_line_ = line_;
     }
     if (found && decimal_ != found)
-      refuse(fmt::format("has a decimal {}, line {} a decimal {}; a file has one of them", name_of(found),
-                         decimal_line_, name_of(decimal_)));
+      return refuse(fmt::format("has a decimal {}, line {} a decimal {}; a file has one of them", name_of(found),
+                                decimal_line_, name_of(decimal_)));
     return value;
   }
 
   static const char* name_of(char decimal) { return decimal == ',' ? "comma" : "point"; }
 
-  [[noreturn]] void fail(std::size_t column, const std::string& what) const {
-    throw CsvError(fmt::format("{}:{}:{}: {}", table_.name, line_, column, what));
+  std::string at(std::size_t column, const std::string& what) const {
+    return fmt::format("{}:{}:{}: {}", table_.name, line_, column, what);
   }
+  [[noreturn]] void fail(std::size_t column, const std::string& what) const { throw CsvError(at(column, what)); }
 
   std::string_view rest_, current_;
   std::size_t line_ = 0;

@@ -26,8 +26,10 @@ std::string stated(const std::string& header, const std::string& given) {
   return given.empty() ? std::string(parts_of_header(header).unit.value_or("")) : given;
 }
 
-ColumnUnit unit_of(const CsvTable& table, std::size_t column, const std::string& given) {
-  const std::string& header = table.header[column];
+// Throws with the names of the columns if there is no such column.
+ColumnUnit unit_of(const CsvTable& table, std::string_view column, const std::string& given) {
+  table.column(column);
+  const std::string& header = table.header[table.find_column(column)];
   const std::string text = stated(header, given);
   if (text.empty()) return {};
   const std::optional<Unit> unit = parse_column_unit(text);
@@ -37,12 +39,6 @@ ColumnUnit unit_of(const CsvTable& table, std::size_t column, const std::string&
                     "number); known are products, quotients and whole powers of {}",
                     table.name, header, text, known_units()));
   return {text, *unit};
-}
-
-// The place of the column, or an exception that names the existing ones.
-std::size_t place_of(const CsvTable& table, std::string_view column) {
-  table.column(column);
-  return table.find_column(column);
 }
 
 // Removes jumps of more than half a turn from one sample to the next.
@@ -80,27 +76,25 @@ CsvTable merged(const std::vector<CsvTable>& tables, const std::vector<std::stri
   std::vector<std::size_t> order(all.rows());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const std::vector<double>& t = all.columns[0];
-  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return t[a] < t[b]; });
+  std::ranges::stable_sort(order, {}, [&](std::size_t row) { return t[row]; });
   // Rows of one time become one row. Each cell of it may come from one file only.
   CsvTable sorted{all.name, all.header, std::vector<std::vector<double>>(columns.size()), {}, all.files, {}};
   constexpr double kRounding = 1e-9;  // of the record's length, beyond what any logger resolves
   const double rounding = order.empty() ? 0 : kRounding * (t[order.back()] - t[order.front()]);
   for (const std::size_t row : order) {
-    const bool joins = !sorted.lines.empty() && t[row] - sorted.columns[0].back() <= rounding;
-    if (!joins) {
-      for (std::size_t c = 0; c < columns.size(); ++c) sorted.columns[c].push_back(all.columns[c][row]);
+    if (sorted.lines.empty() || t[row] - sorted.columns[0].back() > rounding) {
+      sorted.columns[0].push_back(t[row]);
+      for (std::size_t c = 1; c < columns.size(); ++c) sorted.columns[c].push_back(kMissing);
       sorted.lines.push_back(all.lines[row]);
       sorted.file_of_row.push_back(all.file_of_row[row]);
-      continue;
     }
     for (std::size_t c = 1; c < columns.size(); ++c) {
       const double value = all.columns[c][row];
       double& cell = sorted.columns[c].back();
-      if (std::isnan(value)) continue;
-      if (!std::isnan(cell))
+      if (!std::isnan(value) && !std::isnan(cell))
         throw CsvError(fmt::format("{}: column '{}' has a sample at {} s, and so has {}; samples must not count twice",
                                    all.place(row), columns[c], t[row], sorted.place(sorted.rows() - 1)));
-      cell = value;
+      if (!std::isnan(value)) cell = value;
     }
   }
   return sorted;
@@ -121,7 +115,7 @@ std::string stated_unit(const ChannelSpec& channel, const CsvTable& table) {
 
 LoggedColumn column_in_si(const CsvTable& table, std::string_view column, const std::string& given) {
   LoggedColumn result{table.column(column), {}, {}};
-  const auto [text, unit] = unit_of(table, place_of(table, column), given);
+  const auto [text, unit] = unit_of(table, column, given);
   const std::string si = unit.dimension.is_none() ? "1" : to_string(unit.dimension);
   if (!text.empty()) result.unit = si;
   if (unit.to_si == 1) return result;
@@ -133,7 +127,7 @@ LoggedColumn column_in_si(const CsvTable& table, std::string_view column, const 
 LoggedColumn times_in_seconds(const CsvTable& table, std::string_view column, const std::string& given,
                               std::optional<double> time_zero) {
   LoggedColumn result{ascending_times(table, column), {}, {}};
-  const auto [text, unit] = unit_of(table, place_of(table, column), given);
+  const auto [text, unit] = unit_of(table, column, given);
   if (!text.empty() && !compatible(unit.dimension, dimension::kTime))
     throw CsvError(fmt::format("{}: column '{}': '{}' is no unit of time", table.name, column, text));
   result.unit = "s";
@@ -186,20 +180,22 @@ CsvTable read_record(const ExperimentSpec& experiment, std::vector<std::string>*
   for (const std::string& file : experiment.data) {
     CsvTable& table = tables.emplace_back(read_csv(file));
     if (one && !table.has_column(experiment.time)) return std::move(table);  // the user of the column reports it
-    std::set<std::size_t> converted{place_of(table, experiment.time)};
-    const std::vector<double>& clock = table.column(experiment.time);
-    const double first = clock.empty() ? 0 : clock.front();
     LoggedColumn times = times_in_seconds(table, experiment.time, experiment.time_unit, time_zero);
+    const std::size_t clock = table.find_column(experiment.time);
     if (time_zero == SampleColumn::kFirstRow)  // all files have one clock, which starts with the first of them
-      time_zero = first * unit_of(table, *converted.begin(), experiment.time_unit).unit.to_si;
+      time_zero = table.rows() == 0
+                      ? 0
+                      : table.columns[clock].front() * unit_of(table, experiment.time, experiment.time_unit).unit.to_si;
     note(times.read);
+    std::set<std::size_t> converted{clock};
     for (const ChannelSpec& channel : experiment.channels) {
-      if (!table.has_column(channel.column) || !converted.insert(table.find_column(channel.column)).second) continue;
+      const std::size_t column = table.find_column(channel.column);
+      if (column == table.header.size() || !converted.insert(column).second) continue;
       LoggedColumn values = column_in_si(table, channel.column, channel.unit);
       note(values.read);
-      table.columns[table.find_column(channel.column)] = std::move(values.values);
+      table.columns[column] = std::move(values.values);
     }
-    table.columns[*converted.begin()] = std::move(times.values);
+    table.columns[clock] = std::move(times.values);
   }
   if (!one) {
     std::vector<std::string> columns{experiment.time};
@@ -208,8 +204,7 @@ CsvTable read_record(const ExperimentSpec& experiment, std::vector<std::string>*
       if (std::ranges::none_of(tables, has)) tables.front().column(channel.column);  // throws, with the names there are
       if (std::ranges::find(columns, channel.column) == columns.end()) columns.push_back(channel.column);
     }
-    CsvTable all = merged(tables, columns);
-    tables.assign(1, std::move(all));
+    tables = {merged(tables, columns)};
   }
   CsvTable& record = tables.front();
   for (const ChannelSpec& channel : experiment.channels) {
