@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace mbsopt::inline optim {
 
@@ -48,32 +49,26 @@ void name_sampled(Problem& problem) {
 void name_bounded_means(Problem& problem) {
   if (!problem.design) return;
   name_sampled(problem);
-  for (WeightedObjective& term : problem.design->sum) {
-    if (!given_kind(term.means)) continue;
-    term.objective = name_of_mean(term.means);
-    if (std::ranges::count(problem.objectives, term.objective, &ObjectiveSpec::name) == 0) {
-      ObjectiveSpec& objective = problem.objectives.emplace_back();
-      objective.name = term.objective;
-      objective.means = term.means;
-    }
-    term.means = {};
-  }
+  // Moves a mean into an objective of its own, unless another one has its name. Returns this objective if it is new.
+  const auto named = [&](auto& user) -> ObjectiveSpec* {
+    user.objective = name_of_mean(user.means);
+    const Means means = std::exchange(user.means, {});
+    if (std::ranges::count(problem.objectives, user.objective, &ObjectiveSpec::name) > 0) return nullptr;
+    ObjectiveSpec& objective = problem.objectives.emplace_back();
+    objective.name = user.objective;
+    objective.means = means;
+    return &objective;
+  };
+  for (WeightedObjective& term : problem.design->sum)
+    if (given_kind(term.means)) named(term);
   for (ObjectiveBound& bound : problem.design->subject_to) {
     if (!given_kind(bound.means)) continue;
-    ObjectiveSpec objective;
-    objective.name = bound.objective = name_of_mean(bound.means);
-    if (const auto same = std::ranges::find(problem.objectives, objective.name, &ObjectiveSpec::name);
-        same != problem.objectives.end()) {  // of a sum that is minimised
-      bound.means = {};
-      continue;
-    }
-    objective.means = bound.means;
+    ObjectiveSpec* const objective = named(bound);
+    if (!objective) continue;  // of a sum that is minimised
     const double size = std::max(std::abs(bound.lower.value_or(0)), std::abs(bound.upper.value_or(0)));
-    if (objective.is_extreme())
-      objective.sharpness = bound.sharpness.value_or(ObjectiveBound::kSharpness / (size > 0 ? size : 1));
-    bound.means = {};
+    if (objective->is_extreme())
+      objective->sharpness = bound.sharpness.value_or(ObjectiveBound::kSharpness / (size > 0 ? size : 1));
     bound.sharpness.reset();
-    problem.objectives.push_back(std::move(objective));
   }
 }
 
