@@ -102,33 +102,31 @@ std::vector<SceneIssue> starts_issues(const MultistartSpec& spec, const std::vec
 }
 
 std::optional<SceneIssue> curvature_issue(const Problem& problem) {
+  if (!problem.design) return std::nullopt;
+  const DesignSpec& design = *problem.design;
+  const bool squares = design.optimizer.type == OptimizerSpec::kLeastSquares,
+             gauss_newton = design.optimizer.hessian == "gauss_newton";
   const auto is_unread = [](const TrackTerm& term) { return !term.curve; };  // a finding of the reader says why
-  if (problem.design && std::ranges::any_of(problem.objectives, [&](const ObjectiveSpec& objective) {
-        return std::ranges::any_of(objective.track, is_unread);
-      }))
-    return std::nullopt;
-  if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares &&
-      (problem.design->minimize.empty() ||
-       !objectives_of(problem, {problem.design->minimize}).front().is_sum_of_squares()))
-    return SceneIssue{"design.optimizer.type", "is 'least_squares', but '" + problem.design->name() +
+  for (const ObjectiveSpec& objective : problem.objectives)
+    if (std::ranges::any_of(objective.track, is_unread)) return std::nullopt;
+  if (squares && (design.minimize.empty() || !objectives_of(problem, {design.minimize}).front().is_sum_of_squares()))
+    return SceneIssue{"design.optimizer.type", "is 'least_squares', but '" + design.name() +
                                                    "' is not a sum of squares: it may have `track` alone; take ipopt"};
-  if (!problem.design || problem.design->optimizer.hessian != "gauss_newton") return std::nullopt;
-  const std::string& name = problem.design->minimize;
-  if (name.empty())
-    return SceneIssue{"design.optimizer.hessian",
-                      "is 'gauss_newton', which is for one objective that is minimised: take 'lbfgs' or 'exact'"};
+  if (!gauss_newton) return std::nullopt;
+  const auto issue = [](const std::string& words) {
+    return SceneIssue{"design.optimizer.hessian", "is 'gauss_newton', " + words};
+  };
+  const std::string& name = design.minimize;
+  if (name.empty()) return issue("which is for one objective that is minimised: take 'lbfgs' or 'exact'");
   const Objective objective = objectives_of(problem, {name}).front();
   if (objective.free_instants())
-    return SceneIssue{"design.optimizer.hessian", "is 'gauss_newton', but '" + name +
-                                                      "' tracks points of free timing; take the optimizer "
-                                                      "'least_squares', or 'lbfgs' or 'exact'"};
+    return issue("but '" + name +
+                 "' tracks points of free timing; take the optimizer 'least_squares', or 'lbfgs' or 'exact'");
   if (!objective.is_linear() && !objective.is_of_linear_motion()) return std::nullopt;
-  return SceneIssue{
-      "design.optimizer.hessian",
-      "is 'gauss_newton', but '" + name +
-          "' is linear in its sensors and parameters, an eigenvalue or a response; Gauss-Newton neglects all its "
-          "second "
-          "derivatives and is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or 'exact'"};
+  return issue("but '" + name +
+               "' is linear in its sensors and parameters, an eigenvalue or a response; Gauss-Newton neglects all its "
+               "second derivatives and is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or "
+               "'exact'");
 }
 
 }  // namespace mbsopt::inline optim
