@@ -28,7 +28,7 @@ struct LadderDerivative {
   Eigen::VectorXd step;      // of the rung taken,
   Eigen::VectorXd largest;   // and of the first of those that it is extrapolated from
   int evaluations = 0;
-  bool has_estimate(Eigen::Index i) const { return error(i) < std::numeric_limits<double>::max(); }
+  bool has_estimate(Eigen::Index i) const { return i < error.size() && error(i) < std::numeric_limits<double>::max(); }
   void take_better(const LadderDerivative& other);  // its components with less error
 };
 

@@ -34,21 +34,10 @@ constexpr int kWiderLadders = 2;
 class GradientAlong {
  public:
   GradientAlong(Evaluator& evaluator, const VectorXd& rho, const HessianOptions& options)
-      : evaluator_(evaluator), options_(options), rho_(rho), size_(evaluator.sizes(rho)) {
+      : size(evaluator.sizes(rho)), evaluator_(evaluator), options_(options), n_(size.size()) {
     require_second_order(evaluator.scene(), evaluator.options().method);
-    base_ = evaluator.gradients(rho);
-  }
-
-  bool ok() const { return base_.ok; }
-  const std::string& message() const { return base_.ok ? why_ : base_.message; }
-  const Evaluation& base() const { return base_; }
-  const VectorXd& sizes() const { return size_; }
-  Index variables() const { return size_.size(); }
-  Index objectives() const { return base_.psi.size(); }
-  long gradients() const { return gradients_; }
-  const Parameter& parameter(Index k) const { return evaluator_.variable(k); }
-  double largest_gradient(Index objective) const {
-    return base_.psi_rho.row(objective).transpose().cwiseProduct(size_).cwiseAbs().maxCoeff();
+    base = evaluator.gradients(rho);
+    message = base.message;
   }
 
   // F'(0) along d, which is given in sizes with its largest component 1. It has no estimates if it could not be
@@ -56,15 +45,23 @@ class GradientAlong {
   LadderDerivative derivative(const VectorXd& d) {
     double h = options_.relative_step;
     Reach reach = reach_along(d, h);
-    LadderDerivative best = without_constants(ladder(d, reach));
+    LadderDerivative best = ladder(d, reach);
     for (int i = 0; i < kWiderLadders && best.has_estimate(0) && rounding_hides(best); ++i) {
       if (reach.step < h) break;  // the bounds are all the room there is
       h *= kGrowth;
       reach = reach_along(d, h);
-      best.take_better(without_constants(ladder(d, reach)));
+      best.take_better(ladder(d, reach));
     }
     return best;
   }
+  double largest_gradient(Index objective) const {
+    return base.psi_rho.row(objective).transpose().cwiseProduct(size).cwiseAbs().maxCoeff();
+  }
+
+  const VectorXd size;
+  Evaluation base;
+  std::string message;  // why something could not be evaluated
+  long gradients = 0;
 
  private:
   struct Reach {
@@ -72,27 +69,22 @@ class GradientAlong {
     int side;  // +1, -1, or 0: both
   };
 
-  int index(Index k) const { return evaluator_.variables()[static_cast<std::size_t>(k)]; }
-
   std::optional<VectorXd> gradient_at(const VectorXd& d, double h) {
-    VectorXd rho = rho_;
-    for (Index k = 0; k < d.size(); ++k) rho(index(k)) += h * d(k) * size_(k);
-    const Evaluation e = evaluator_.gradients_on(base_.steps, rho, base_.method);
-    ++gradients_;
+    VectorXd rho = base.rho;
+    rho(evaluator_.variables()) += (h * d).cwiseProduct(size);
+    const Evaluation e = evaluator_.gradients_on(base.steps, rho, base.method);
+    ++gradients;
     if (!e.ok) {
-      why_ = e.message;
+      message = e.message;
       return std::nullopt;
     }
-    VectorXd F(objectives() * variables());
-    for (Index i = 0; i < objectives(); ++i)
-      F.segment(i * variables(), variables()) = e.psi_rho.row(i).transpose().cwiseProduct(size_);
-    return F;
+    return VectorXd((e.psi_rho * size.asDiagonal()).transpose().reshaped());
   }
 
   // F at the point itself, on the same frozen steps: implicit stages are then solved to rounding, as at all other
   // points.
   const VectorXd& F0() {
-    if (F0_.size() == 0) F0_ = gradient_at(VectorXd::Zero(variables()), 0).value_or(VectorXd());
+    if (F0_.size() == 0) F0_ = gradient_at(VectorXd::Zero(n_), 0).value_or(VectorXd());
     return F0_;
   }
 
@@ -101,10 +93,10 @@ class GradientAlong {
   Reach reach_along(const VectorXd& d, double h) const {
     constexpr double kInside = 1 - 1e-9;  // rounding must not cross the bound
     double plus = kInfinity, minus = kInfinity;
-    for (Index k = 0; k < d.size(); ++k) {
+    for (Index k = 0; k < n_; ++k) {
       if (d(k) == 0) continue;
-      const Parameter& p = parameter(k);
-      const double value = rho_(index(k)), slope = d(k) * size_(k);
+      const Parameter& p = evaluator_.variable(k);
+      const double value = base.rho(evaluator_.variables()[static_cast<std::size_t>(k)]), slope = d(k) * size(k);
       double above = p.upper ? (*p.upper - value) / std::abs(slope) : kInfinity;
       double below = p.lower ? (value - *p.lower) / std::abs(slope) : kInfinity;
       if (slope < 0) std::swap(above, below);
@@ -122,55 +114,42 @@ class GradientAlong {
     LadderOptions options{reach.step, options_.rungs, kGradientRounding,
                           [&](const LadderDerivative& best) { return good_enough(best); }};
     LadderDerivative best;
-    if (reach.side == 0) {
-      best = difference_ladder(F, objectives() * variables(), options);
-      if (best.has_estimate(0)) return best;
-    }
+    if (reach.side == 0) best = difference_ladder(F, base.psi.size() * n_, options);
     // One side may lie outside the domain of an expression.
     for (const int side : {1, -1}) {
+      if (best.has_estimate(0)) break;
       if ((reach.side != 0 && side != reach.side) || F0().size() == 0) continue;
       options.step = side * reach.step;
       best = one_sided_ladder(F, F0(), options);
-      if (best.has_estimate(0)) break;
     }
+    for (Index c = 0; c < best.error.size(); ++c)  // an entry that no step changed by a bit is constant
+      if (best.derivative(c) == 0 && best.has_estimate(c) && best.error(c) == best.rounding(c)) best.error(c) = 0;
     return best;
   }
 
-  // An entry that no step changed by a bit is constant.
-  static LadderDerivative without_constants(LadderDerivative found) {
-    for (Index c = 0; c < found.error.size(); ++c)
-      if (found.derivative(c) == 0 && found.has_estimate(c) && found.error(c) == found.rounding(c)) found.error(c) = 0;
-    return found;
-  }
-
   bool good_enough(const LadderDerivative& best) const {
-    for (Index i = 0; i < objectives(); ++i) {
-      const auto part = Eigen::seqN(i * variables(), variables());
-      const double size = std::max(best.derivative(part).cwiseAbs().maxCoeff(), largest_gradient(i));
-      if (!(best.error(part).maxCoeff() <= options_.enough * size)) return false;
+    for (Index i = 0; i < base.psi.size(); ++i) {
+      const double size_of_row =
+          std::max(best.derivative.segment(i * n_, n_).cwiseAbs().maxCoeff(), largest_gradient(i));
+      if (!(best.error.segment(i * n_, n_).maxCoeff() <= options_.enough * size_of_row)) return false;
     }
     return true;
   }
 
   bool rounding_hides(const LadderDerivative& best) const {
-    for (Index i = 0; i < objectives(); ++i) {
-      const auto part = Eigen::seqN(i * variables(), variables());
+    for (Index i = 0; i < base.psi.size(); ++i) {
       Index worst = 0;
-      const double error = best.error(part).maxCoeff(&worst);
-      const bool by_rounding = error <= 2 * best.rounding(i * variables() + worst);
-      if (by_rounding && error > kHidden * best.derivative(part).cwiseAbs().maxCoeff()) return true;
+      const double error = best.error.segment(i * n_, n_).maxCoeff(&worst);
+      const bool by_rounding = error <= 2 * best.rounding(i * n_ + worst);
+      if (by_rounding && error > kHidden * best.derivative.segment(i * n_, n_).cwiseAbs().maxCoeff()) return true;
     }
     return false;
   }
 
   Evaluator& evaluator_;
   const HessianOptions& options_;
-  const VectorXd rho_;
-  VectorXd size_;
-  Evaluation base_;
+  const Index n_;  // variables
   VectorXd F0_;
-  std::string why_;
-  long gradients_ = 0;
 };
 
 std::string not_differenced(const std::string& what, const std::string& why) {
@@ -214,20 +193,18 @@ void require_second_order(const Scene& scene, GradientMethod method) {
 
 Hessians hessians(Evaluator& evaluator, const VectorXd& rho, const HessianOptions& options) {
   const Stopwatch stopwatch;
-  Hessians result;
   GradientAlong along(evaluator, rho, options);
-  if (!along.ok()) {
-    result.message = along.message();
-    return result;
-  }
-  const Index n = along.variables(), m = along.objectives();
-  result.method = along.base().method;
+  Hessians result;
+  result.message = along.message;
+  if (!along.base.ok) return result;
+  const Index n = along.size.size(), m = along.base.psi.size();
+  result.method = along.base.method;
   std::vector<MatrixXd> raw(static_cast<std::size_t>(m), MatrixXd::Zero(n, n)), error = raw;
   for (Index q = 0; q < n; ++q) {
     const LadderDerivative column = along.derivative(VectorXd::Unit(n, q));
-    result.gradients = along.gradients();
+    result.gradients = along.gradients;
     if (m > 0 && !column.has_estimate(0)) {
-      result.message = not_differenced(fmt::format("'{}'", along.parameter(q).name), along.message());
+      result.message = not_differenced(fmt::format("'{}'", evaluator.variable(q).name), along.message);
       return result;
     }
     for (Index i = 0; i < m; ++i) {
@@ -241,42 +218,35 @@ Hessians hessians(Evaluator& evaluator, const VectorXd& rho, const HessianOption
   }
   for (Index i = 0; i < m; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    result.of.push_back(symmetrised(raw[at], error[at], along.sizes()));
+    result.of.push_back(symmetrised(raw[at], error[at], along.size));
     if (n > 0) result.of.back().gradient = along.largest_gradient(i);
   }
   result.ok = true;
+  result.message.clear();
   result.wall_seconds = stopwatch.seconds();
   return result;
 }
 
 HessianProducts hessian_products(Evaluator& evaluator, const VectorXd& rho, const VectorXd& d,
                                  const HessianOptions& options) {
-  HessianProducts result;
   GradientAlong along(evaluator, rho, options);
-  const Index n = along.variables(), m = along.objectives();
+  const Index n = along.size.size(), m = along.base.psi.size();
   if (d.size() != n)
     throw std::invalid_argument(fmt::format("a direction of {} components for {} variables", d.size(), n));
-  if (!along.ok()) {
-    result.message = along.message();
-    return result;
-  }
-  result.product.setZero(m, n);
-  result.error.setZero(m, n);
-  result.ok = true;
-  const VectorXd in_sizes = d.cwiseQuotient(along.sizes());
+  HessianProducts result{along.base.ok, along.message, MatrixXd::Zero(m, n), MatrixXd::Zero(m, n)};
+  const VectorXd in_sizes = d.cwiseQuotient(along.size);
   const double longest = n > 0 ? in_sizes.cwiseAbs().maxCoeff() : 0;
-  if (longest == 0 || m == 0) return result;
+  if (!result.ok || longest == 0 || m == 0) return result;
   const LadderDerivative found = along.derivative(in_sizes / longest);
-  result.gradients = along.gradients();
-  if (!found.has_estimate(0)) {
-    result.ok = false;
-    result.message = not_differenced("this direction", along.message());
-    return result;
-  }
-  for (Index i = 0; i < m; ++i) {
-    result.product.row(i) = longest * found.derivative.segment(i * n, n).cwiseQuotient(along.sizes()).transpose();
-    result.error.row(i) = longest * found.error.segment(i * n, n).cwiseQuotient(along.sizes()).transpose();
-  }
+  result.gradients = along.gradients;
+  result.ok = found.has_estimate(0);
+  result.message = result.ok ? "" : not_differenced("this direction", along.message);
+  if (!result.ok) return result;
+  const auto in_parameters = [&](const VectorXd& of_F) -> MatrixXd {
+    return longest * of_F.reshaped(n, m).transpose() * along.size.cwiseInverse().asDiagonal();
+  };
+  result.product = in_parameters(found.derivative);
+  result.error = in_parameters(found.error);
   return result;
 }
 
