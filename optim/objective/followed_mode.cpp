@@ -42,13 +42,13 @@ struct FollowedMode::State {
   }
   const VectorXd& y() const { return assembly.result().y; }
   const VectorXd& angles() const { return assembly.result().angles; }
-  int bodies() const { return mechanism.bodies(); }
+  Index positions() const { return y().size() / 2; }
   // The units of y: lengths by the mechanism's size, rates by the mode's.
   VectorXd units(double rate) const {
-    const StateLayout layout{bodies()};
+    const StateLayout layout = StateLayout::of(y());
     VectorXd s = VectorXd::Ones(y().size());
     for (int k = 1; k <= layout.n; ++k) s.segment<3>(layout.q(k)).setConstant(x.length);
-    s.tail(layout.positions()) = rate * s.head(layout.positions());
+    s.tail(positions()) = rate * s.head(positions());
     return s;
   }
   std::vector<Index> modes() const {  // from slow to fast; one of each pair
@@ -57,16 +57,11 @@ struct FollowedMode::State {
       if (x.eigenvalues(k).imag() >= 0) of.push_back(k);
     return of;
   }
+  // The displacements of the modes without units, of unit length.
   Eigen::MatrixXcd shapes() const {
-    const std::vector<Index> of = modes();
-    Eigen::MatrixXcd shapes(StateLayout{bodies()}.positions(), static_cast<Index>(of.size()));
-    for (std::size_t k = 0; k < of.size(); ++k) shapes.col(static_cast<Index>(k)) = shape(of[k]);
+    Eigen::MatrixXcd shapes = x.modes(Eigen::seqN(0, positions()), modes());
+    for (auto shape : shapes.colwise()) shape = shape.cwiseQuotient(units(1).head(positions())).normalized().eval();
     return shapes;
-  }
-  // The displacements of a mode without units, of unit length.
-  VectorXcd shape(Index mode) const {
-    const Index half = StateLayout{bodies()}.positions();
-    return x.modes.col(mode).head(half).cwiseQuotient(units(1).head(half)).normalized();
   }
 };
 
@@ -79,14 +74,9 @@ FollowedMode::FollowedMode(const Scene& scene, const EigenvalueSpec& spec)
     : scene_(scene), spec_(spec), reference_(std::make_unique<Reference>()) {}
 FollowedMode::~FollowedMode() = default;
 
-std::unique_ptr<FollowedMode::State> FollowedMode::state_at(const VectorXd& rho, const UserForces& forces,
-                                                            bool derivatives) const {
-  return std::make_unique<State>(scene_, rho, forces, derivatives);
-}
-
 Index FollowedMode::mode_of(const State& state, const UserForces& forces) const {
   std::call_once(reference_->once, [&] {
-    reference_->shapes = state_at(parameter_values(scene_), forces, false)->shapes();
+    reference_->shapes = State(scene_, parameter_values(scene_), forces, false).shapes();
     if (reference_->shapes.cols() < spec_.mode)
       throw std::runtime_error(
           fmt::format("there is no mode {}: the initial state has {}", spec_.mode, reference_->shapes.cols()));
@@ -105,8 +95,8 @@ double FollowedMode::value_of(std::complex<double> lambda) const {
 }
 
 double FollowedMode::value(const VectorXd& rho, const UserForces& forces) const {
-  const std::unique_ptr<State> state = state_at(rho, forces, false);
-  return value_of(state->x.eigenvalues(mode_of(*state, forces)));
+  const State state(scene_, rho, forces, false);
+  return value_of(state.x.eigenvalues(mode_of(state, forces)));
 }
 
 namespace {
@@ -131,30 +121,30 @@ MatrixXd state_matrix(SpatialDynamics& dynamics) {
 
 double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces, Eigen::Ref<VectorXd> rho_bar,
                                   std::vector<std::string>* warnings) const {
-  const std::unique_ptr<State> state = state_at(rho, forces, true);
-  const Index mode = mode_of(*state, forces);
-  const std::complex<double> lambda = state->x.eigenvalues(mode);
+  State state(scene_, rho, forces, true);
+  const Index mode = mode_of(state, forces);
+  const std::complex<double> lambda = state.x.eigenvalues(mode);
   const double size = std::abs(lambda);
-  if (size <= state->x.errors(mode))
+  if (size <= state.x.errors(mode))
     throw std::runtime_error("the mode is a free motion, whose eigenvalue 0 has no derivative");
-  for (Index k = 0; warnings && k < state->x.eigenvalues.size(); ++k) {
+  for (Index k = 0; warnings && k < state.x.eigenvalues.size(); ++k) {
     constexpr double kSame = 1e-6;  // relative: closer ones turn into each other within a usual step of a design
-    if (k != mode && std::abs(state->x.eigenvalues(k) - lambda) <= kSame * size)
+    if (k != mode && std::abs(state.x.eigenvalues(k) - lambda) <= kSame * size)
       warnings->push_back("another mode has the same eigenvalue: neither has a derivative there");
   }
 
-  SpatialDynamics dynamics(state->mechanism, state->formulation);
+  SpatialDynamics dynamics(state.mechanism, state.formulation);
   const MechanismData& d = dynamics.data();
-  const VectorXd units = state->units(size);
+  const VectorXd units = state.units(size);
   VectorXd ydot(units.size());
   const auto linearise_at = [&](const VectorXd& y) {
-    if (!dynamics.evaluate(state->t, y, state->angles(), ydot)) return false;
+    if (!dynamics.evaluate(state.t, y, state.angles(), ydot)) return false;
     dynamics.linearise_here();
     return true;
   };
-  if (!linearise_at(state->y())) throw std::runtime_error("the accelerations of this state cannot be computed");
+  if (!linearise_at(state.y())) throw std::runtime_error("the accelerations of this state cannot be computed");
   const MatrixXd F = units.cwiseInverse().asDiagonal() * state_matrix(dynamics) * units.asDiagonal();
-  const VectorXcd v = state->x.modes.col(mode).cwiseQuotient(units).normalized();
+  const VectorXcd v = state.x.modes.col(mode).cwiseQuotient(units).normalized();
   VectorXcd w = left_eigenvector(F, lambda);
   w /= std::conj(w.dot(v));  // w'v = 1
   const VectorXcd w_in_y = w.conjugate().cwiseQuotient(units), v_in_y = v.cwiseProduct(units);
@@ -180,7 +170,7 @@ double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces,
     constexpr int kRungs = 5;
     const double moves = u.cwiseQuotient(units).cwiseAbs().maxCoeff();
     if (moves == 0) return VectorXd(VectorXd::Zero(2 * (states + P)));
-    const LadderDerivative slope = difference_ladder([&](double h) { return adjoints(state->y() + h * u); },
+    const LadderDerivative slope = difference_ladder([&](double h) { return adjoints(state.y() + h * u); },
                                                      2 * (states + P), {kStep / moves, kRungs});
     if (!slope.derivative.allFinite()) throw std::runtime_error("the derivative of the mode is not finite");
     return slope.derivative;
@@ -191,7 +181,7 @@ double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces,
   MatrixXd lambda_rho(P, 2), y_bar(states, 2);
   lambda_rho << re.tail(P), im.tail(P);
   y_bar << re.head(states), im.head(states);
-  state->assembly.add_adjoint(y_bar, lambda_rho);
+  state.assembly.add_adjoint(y_bar, lambda_rho);
 
   // d|lambda| = Re(conj(lambda) dlambda)/|lambda|
   const VectorXd size_rho = (lambda.real() * lambda_rho.col(0) + lambda.imag() * lambda_rho.col(1)) / size;

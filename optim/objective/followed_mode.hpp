@@ -36,7 +36,6 @@ class FollowedMode {
 
  private:
   struct State;  // the linearised equilibrium at some rho
-  std::unique_ptr<State> state_at(const Eigen::VectorXd& rho, const UserForces& forces, bool derivatives) const;
   Eigen::Index mode_of(const State& state, const UserForces& forces) const;
   double value_of(std::complex<double> lambda) const;
 

@@ -21,13 +21,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-std::complex<double> response(const Linearisation& x, double f) {
-  return transfer(x, {0, 2 * std::numbers::pi * f})(0, 0);
-}
+constexpr double kTurn = 2 * std::numbers::pi;
+
+std::complex<double> response(const Linearisation& x, double f) { return transfer(x, {0, kTurn * f})(0, 0); }
 
 // d|H|^2/df up to a factor: Re(conj(H) H_f),  H_s = -C (s - A)^-2 B
 double slope(const Linearisation& x, double f) {
-  const std::complex<double> s(0, 2 * std::numbers::pi * f);
+  const std::complex<double> s(0, kTurn * f);
   Eigen::MatrixXcd left = -x.A;
   left.diagonal().array() += s;
   const Eigen::PartialPivLU<Eigen::MatrixXcd> factor(left);
@@ -67,8 +67,7 @@ Linearisation FrequencyResponse::linearised(const VectorXd& rho, const UserForce
     throw std::runtime_error(error.what());
   }
   throw std::runtime_error(
-      "the initial state is no equilibrium, so there is no response near it: set "
-      "initial.equilibrium");
+      "the initial state is no equilibrium, so there is no response near it: set initial.equilibrium");
 }
 
 // Resonances and their flanks, and between them as many as a smooth curve needs.
@@ -79,7 +78,7 @@ std::vector<double> FrequencyResponse::frequencies(const Linearisation& x) const
   std::vector<double> all{from, to};
   for (int k = 1; k < kBetween; ++k) all.push_back(from + (to - from) * k / kBetween);
   for (const std::complex<double>& lambda : x.eigenvalues) {
-    const double f = frequency(lambda), width = std::abs(lambda.real()) / (2 * std::numbers::pi);
+    const double f = frequency(lambda), width = std::abs(lambda.real()) / kTurn;
     for (const double flank : kFlanks)
       if (const double here = f + flank * width; here > from && here < to) all.push_back(here);
   }
@@ -134,8 +133,7 @@ std::vector<FrequencyResponse::Peak> FrequencyResponse::peaks_of(const Linearisa
 }
 
 double FrequencyResponse::value(const VectorXd& rho, const UserForces& forces) const {
-  const Linearisation x = linearised(rho, forces);
-  return is_largest() ? peaks_of(x).front().value : value_at(x, spec_.at.value_or(0));
+  return peaks(rho, forces, {}).front().value;
 }
 
 std::vector<FrequencyResponse::Peak> FrequencyResponse::peaks(const VectorXd& rho, const UserForces& forces,
@@ -143,13 +141,8 @@ std::vector<FrequencyResponse::Peak> FrequencyResponse::peaks(const VectorXd& rh
   constexpr double kStep = 1e-2;  // of a parameter; rungs below it extrapolate to some 1e-10
   constexpr int kRungs = 6;
   const Linearisation here = linearised(rho, forces);
-  std::vector<Peak> peaks;
-  if (is_largest()) {
-    peaks = peaks_of(here);
-  } else {
-    const double f = spec_.at.value_or(0);
-    peaks = {{f, value_at(here, f), {}}};
-  }
+  const double f = spec_.at.value_or(0);
+  std::vector<Peak> peaks = is_largest() ? peaks_of(here) : std::vector<Peak>{{f, value_at(here, f), {}}};
   for (Peak& peak : peaks) peak.gradient.setZero(static_cast<Index>(variables.size()));
   for (std::size_t v = 0; v < variables.size(); ++v) {
     const double size = typical_size(scene_.parameters[static_cast<std::size_t>(variables[v])], rho(variables[v]));
@@ -161,7 +154,7 @@ std::vector<FrequencyResponse::Peak> FrequencyResponse::peaks(const VectorXd& rh
         VectorXd values(static_cast<Index>(peaks.size()));
         for (std::size_t k = 0; k < peaks.size(); ++k) values(static_cast<Index>(k)) = value_at(x, peaks[k].frequency);
         if (spec_.value == "phase")  // on the turn of the value itself
-          values(0) = peaks[0].value + std::remainder(values(0) - peaks[0].value, 2 * std::numbers::pi);
+          values(0) = peaks[0].value + std::remainder(values(0) - peaks[0].value, kTurn);
         return values;
       } catch (const std::runtime_error&) {
         return std::nullopt;
