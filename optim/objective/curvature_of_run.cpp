@@ -90,38 +90,34 @@ CurvatureOfRun::CurvatureOfRun(std::span<const Objective> objectives, const std:
 
 CurvatureOfRun::~CurvatureOfRun() = default;
 
-// In the order of time.
-std::vector<CurvatureOfRun::Look> CurvatureOfRun::looks_of(const StepSequence& steps, double start_time,
-                                                           double end_time) const {
-  constexpr int kPanels = 30;  // of a run without given steps: 90 looks, as a report has some 100 rows
-  std::vector<Look> looks;
-  const bool integrates = std::ranges::any_of(objectives_, [](const Objective& o) { return o.running().has_value(); });
-  const auto add_panel = [&](double t, double h) {
-    for (std::size_t j = 0; j < kNodes.size(); ++j) looks.push_back({t + kNodes[j] * h, kWeights[j] * h});
-  };
-  for (std::size_t i = 0; integrates && i < steps.times.size(); ++i) add_panel(steps.times[i], steps.sizes[i]);
-  const double h = (end_time - start_time) / kPanels;
-  for (int k = 0; integrates && steps.times.empty() && k < kPanels; ++k) add_panel(start_time + k * h, h);
-  for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    if (objectives_[i].terminal()) looks.push_back({end_time, 0, i, &*objectives_[i].terminal()});
-    for (const Objective::Sample& sample : objectives_[i].samples())
-      looks.push_back({sample.time, 0, i, &sample.value});
-  }
-  std::stable_sort(looks.begin(), looks.end(), [](const Look& a, const Look& b) { return a.time < b.time; });
-  return looks;
-}
-
 TangentSampling CurvatureOfRun::sampling(const Mechanism& mechanism, const StepSequence& steps,
                                          const SimulationSettings& settings) {
-  looks_ = looks_of(steps, settings.start_time, settings.end_time);
+  constexpr int kPanels = 30;  // of a run without given steps: 90 looks, as a report has some 100 rows
   TangentSampling sampling;
   sampling.reads_positions = true;
-  for (const Look& look : looks_) {
-    sampling.times.push_back(look.time);
-    if (look.expression && !look.expression->bind(mechanism)->reads_positions()) sampling.reads_positions = false;
+  const auto look_at = [&](double t, double weight, std::size_t objective, const CostExpression* expression) {
+    looks_.push_back({t, weight, objective, expression});
+    if (expression && !expression->bind(mechanism)->reads_positions()) sampling.reads_positions = false;
+  };
+  const auto look_at_panel = [&](double t, double h) {
+    for (std::size_t j = 0; j < kNodes.size(); ++j) look_at(t + kNodes[j] * h, kWeights[j] * h, 0, nullptr);
+  };
+  looks_.clear();
+  bool integrates = false;
+  for (const Objective& o : objectives_) {
+    if (!o.running()) continue;
+    integrates = true;
+    if (!o.running()->bind(mechanism)->reads_positions()) sampling.reads_positions = false;
   }
-  for (const Objective& o : objectives_)
-    if (o.running() && !o.running()->bind(mechanism)->reads_positions()) sampling.reads_positions = false;
+  for (std::size_t i = 0; integrates && i < steps.times.size(); ++i) look_at_panel(steps.times[i], steps.sizes[i]);
+  const double h = (settings.end_time - settings.start_time) / kPanels;
+  for (int k = 0; integrates && steps.times.empty() && k < kPanels; ++k) look_at_panel(settings.start_time + k * h, h);
+  for (std::size_t i = 0; i < objectives_.size(); ++i) {
+    if (objectives_[i].terminal()) look_at(settings.end_time, 0, i, &*objectives_[i].terminal());
+    for (const Objective::Sample& sample : objectives_[i].samples()) look_at(sample.time, 0, i, &sample.value);
+  }
+  std::ranges::stable_sort(looks_, {}, &Look::time);
+  for (const Look& look : looks_) sampling.times.push_back(look.time);
   sampling.observe = [this, &mechanism](std::size_t index, const StatePoint& state, const MatrixXd& y_rho) {
     const Look& look = looks_[index];
     if (look.expression)

@@ -28,7 +28,6 @@ class CurvatureOfRun {
  private:
   class Gathered;
   struct Look;
-  std::vector<Look> looks_of(const StepSequence& steps, double start_time, double end_time) const;
 
   std::span<const Objective> objectives_;
   const std::vector<int>& variables_;
