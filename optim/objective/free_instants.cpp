@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
-#include <numeric>
+#include <map>
 
 #include "core/simulate/simulation.hpp"
 
@@ -164,18 +165,15 @@ struct FreeInstants::Scan {
   Block downhill(const Points& points, std::size_t node) const {
     const auto falls = [&](std::size_t i) { return at(points, motion, i).rate < 0; };
     std::size_t i = node;
-    if (falls(i)) {
-      while (i < last() && falls(i + 1)) ++i;
-    } else {
+    while (i < last() && falls(i)) ++i;
+    if (i == node && !falls(i))
       while (i > 0 && !falls(i - 1)) --i;
-      if (i > 0)
-        --i;
-      else
-        return with_node(at_end(points, 0), node);
-    }
-    return with_node(i == last() ? at_end(points, i) : between(points, i), node);
+    // D falls before i and not at i, or i is an end.
+    const bool is_end = i == 0 || (i == last() && falls(i));
+    Block block = is_end ? at_end(points, i) : between(points, i - 1);
+    block.node = node;
+    return block;
   }
-  static Block with_node(Block block, std::size_t node) { return block.node = node, block; }
 
   bool is_closed() const {
     const VectorXd extent = motion.s.rowwise().maxCoeff() - motion.s.rowwise().minCoeff();
@@ -211,6 +209,24 @@ struct FreeInstants::Scan {
     }
     return blocks;
   }
+
+  std::vector<Block> all() const {
+    std::vector<Block> blocks;
+    std::map<std::string, std::map<std::size_t, std::size_t>> ordered;  // points by file and row
+    for (std::size_t p = 0; p < free.points_.size(); ++p) {
+      const Point& point = free.points_[p];
+      if (point.ordered)
+        ordered[point.file][point.row] = p;
+      else
+        blocks.push_back(best({p}));
+    }
+    for (const auto& [file, rows] : ordered) {
+      Points in_rows;
+      for (const auto& [row, p] : rows) in_rows.push_back(p);
+      std::ranges::move(in_order(in_rows), std::back_inserter(blocks));
+    }
+    return blocks;
+  }
 };
 
 FreeInstants::FreeInstants(const SimulationSettings& settings) {
@@ -220,21 +236,19 @@ FreeInstants::FreeInstants(const SimulationSettings& settings) {
   settings_.solve = Solve::kinematics;
 }
 
-std::size_t FreeInstants::point(const std::string& file, bool ordered, std::size_t row) {
-  const auto found = std::ranges::find_if(
-      points_, [&](const Point& p) { return p.row == row && p.file == file && p.ordered == ordered; });
-  if (found != points_.end()) return static_cast<std::size_t>(found - points_.begin());
-  points_.push_back({file, ordered, row, {}});
-  return points_.size() - 1;
-}
-
-std::size_t FreeInstants::channel(const CostExpression& sensor, const CostExpression& weight) {
+std::vector<std::size_t> FreeInstants::add(const std::string& file, bool ordered, const Curve& targets,
+                                           const CostExpression& sensor, const CostExpression& weight) {
+  std::vector<std::size_t> numbers;
+  for (std::size_t k = 0; k < targets.x().size(); ++k) {
+    const std::size_t row = static_cast<std::size_t>(targets.x()[k]);
+    auto point = std::ranges::find_if(
+        points_, [&](const Point& p) { return p.row == row && p.file == file && p.ordered == ordered; });
+    if (point == points_.end()) point = points_.insert(points_.end(), {file, ordered, row, {}});
+    point->coordinates.push_back({channels_.size(), targets.y()[k]});
+    numbers.push_back(static_cast<std::size_t>(point - points_.begin()));
+  }
   channels_.push_back({sensor, weight});
-  return channels_.size() - 1;
-}
-
-void FreeInstants::add(std::size_t point, std::size_t channel, double target) {
-  points_[point].coordinates.push_back({channel, target});
+  return numbers;
 }
 
 FreeInstants::Motion FreeInstants::motion_at(const Mechanism& mechanism, const std::vector<double>& times,
@@ -262,29 +276,10 @@ FreeInstants::Motion FreeInstants::motion_at(const Mechanism& mechanism, const s
   return motion;
 }
 
-std::vector<FreeInstants::Block> FreeInstants::seen_by(const Scan& scan) const {
-  std::vector<Block> blocks;
-  std::vector<std::size_t> rows(points_.size());
-  std::iota(rows.begin(), rows.end(), std::size_t{0});
-  std::ranges::stable_sort(rows, {}, [&](std::size_t p) { return std::pair(points_[p].file, points_[p].row); });
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (!points_[rows[k]].ordered) {
-      blocks.push_back(scan.best({rows[k]}));
-      continue;
-    }
-    std::vector<std::size_t> of_file{rows[k]};
-    const Point& first = points_[rows[k]];
-    while (k + 1 < rows.size() && points_[rows[k + 1]].ordered && points_[rows[k + 1]].file == first.file)
-      of_file.push_back(rows[++k]);
-    for (Block& block : scan.in_order(of_file)) blocks.push_back(std::move(block));
-  }
-  return blocks;
-}
-
 std::vector<FreeInstants::Instant> FreeInstants::nearest(const Mechanism& mechanism,
                                                          const std::function<bool(double t)>& progress) const {
   const Scan scan{*this, motion_at(mechanism, scan_times(settings_), progress)};
-  std::vector<Block> blocks = seen_by(scan);
+  std::vector<Block> blocks = scan.all();
   std::vector<Block*> moving;  // whose instant is not settled
   for (Block& block : blocks) {
     if (!std::isfinite(block.square)) throw NoMotion("a tracked sensor has no value");

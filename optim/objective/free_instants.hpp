@@ -40,12 +40,10 @@ class FreeInstants {
  public:
   explicit FreeInstants(const SimulationSettings& settings);
 
-  // The number of a row's point. Terms of one file share their points.
-  std::size_t point(const std::string& file, bool ordered, std::size_t row);
-  // The number of a sensor that measures points. The sensor reads positions only, and weight depends on parameters
-  // only.
-  std::size_t channel(const CostExpression& sensor, const CostExpression& weight);
-  void add(std::size_t point, std::size_t channel, double target);
+  // Adds rows of a file that a sensor should meet, and returns the numbers of their points. Terms of one file share
+  // them. The sensor reads positions only, and weight depends on parameters only.
+  std::vector<std::size_t> add(const std::string& file, bool ordered, const Curve& targets,
+                               const CostExpression& sensor, const CostExpression& weight);
 
   struct Instant {
     double tau = 0;         // [s]
@@ -76,7 +74,6 @@ class FreeInstants {
   struct Scan;
   Motion motion_at(const Mechanism& mechanism, const std::vector<double>& times,
                    const std::function<bool(double t)>& progress) const;
-  std::vector<Block> seen_by(const Scan& scan) const;
 
   SimulationSettings settings_;  // of the solved motion
   std::vector<Channel> channels_;

@@ -117,15 +117,12 @@ void Objective::follow(const TrackTerm& term, const Scene& scene, const std::str
     return;
   }
   if (!free_instants_) free_instants_.emplace(scene.simulation);
-  const std::size_t channel = free_instants_->channel(compile(sensor), compile(term.weight));
-  for (std::size_t k = 0; k < term.curve->x().size(); ++k) {
-    const double target = term.curve->y()[k];
-    const std::size_t point =
-        free_instants_->point(term.file, term.timing == Timing::ordered, static_cast<std::size_t>(term.curve->x()[k]));
-    free_instants_->add(point, channel, target);
-    const Expression off = sensor - Expression(target);
-    samples_.push_back({t0, compile(term.weight * (off * off)), point});
-    residuals_.push_back({t0, compile(root * off), point});
+  const std::vector<std::size_t> points = free_instants_->add(term.file, term.timing == Timing::ordered, *term.curve,
+                                                              compile(sensor), compile(term.weight));
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const Expression off = sensor - Expression(term.curve->y()[k]);
+    samples_.push_back({t0, compile(term.weight * (off * off)), points[k]});
+    residuals_.push_back({t0, compile(root * off), points[k]});
   }
 }
 
