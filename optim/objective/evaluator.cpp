@@ -8,8 +8,6 @@
 #include <mutex>
 #include <numeric>
 #include <stdexcept>
-#include <unordered_map>
-#include <unordered_set>
 
 #include "core/cvodes/cvodes.hpp"
 #include "core/expression/counted.hpp"
@@ -225,23 +223,15 @@ void Evaluator::find_unused() {
       user->parameters.clear();
     }
   }
-  std::vector<SceneIssue> unused = find_unused_parameters(judged);
-  if (opaque) {  // may look at every body
-    judged.objectives.clear();
-    const std::vector<SceneIssue> by_model = find_unused_parameters(judged);
-    std::unordered_set<std::string> paths;
-    for (const SceneIssue& issue : by_model) paths.insert(issue.path);
-    std::erase_if(unused, [&](const SceneIssue& issue) { return !paths.contains(issue.path); });
-  }
-  if (unused.empty()) return;
-  std::unordered_map<std::string, std::size_t> variables;  // by path
-  for (std::size_t k = 0; k < variables_.size(); ++k)
-    variables.emplace("parameters." + scene_.parameters[static_cast<std::size_t>(variables_[k])].name, k);
-  for (const SceneIssue& issue : unused) {
-    const auto variable = variables.find(issue.path);
-    if (variable == variables.end()) continue;
+  // What is opaque may look at every body.
+  for (const SceneIssue& issue : find_unused_parameters(judged, opaque)) {
+    const auto is_at = [&](int k) {
+      return issue.path == "parameters." + scene_.parameters[static_cast<std::size_t>(k)].name;
+    };
+    const auto variable = std::ranges::find_if(variables_, is_at);
+    if (variable == variables_.end()) continue;
     if (!opaque) throw std::invalid_argument(issue.path + ": " + issue.message);
-    perhaps_unused_.push_back(variable->second);
+    perhaps_unused_.push_back(static_cast<std::size_t>(variable - variables_.begin()));
   }
 }
 

@@ -125,30 +125,30 @@ class MentionSearch {
   SceneFacts facts_;
 };
 
+// The lists of what acts on bodies.
+void for_acting(auto& scene, const auto& f) {
+  f(scene.bodies), f(scene.joints), f(scene.drives), f(scene.forces), f(scene.conditions);
+}
+
 // Collects what the objectives and measurements of a problem depend on. Without any, a sensor of everything replaces
 // them. Joints, forces and conditions on an observed body make all their bodies observed. The ground is no body here.
 class Reach {
  public:
-  explicit Reach(const Problem& problem) : scene_(problem.scene), search_(scene_) {
+  explicit Reach(const Problem& problem, bool whole = false) : scene_(problem.scene), search_(scene_) {
     Mentions observed = observed_by(problem);
-    if (problem.objectives.empty() && !problem.identification) {
+    if (whole || (problem.objectives.empty() && !problem.identification)) {
       for (const Sensor& sensor : scene_.sensors) search_.add(sensor, observed);
       search_.add_whole(observed);
     }
     if (!observed.bodies.empty())
       for (const Field& field : scene_.gravity) search_.add(field, Scope::none, observed);
     std::unordered_map<std::string, std::vector<std::shared_ptr<Mentions>>> acting;  // on each body
-    const auto add = [&](const auto& elements) {
+    for_acting(scene_, [&](const auto& elements) {
       for (const auto& element : elements) {
         const auto mentions = std::make_shared<Mentions>(search_.of(element));
         for (const std::string& body : mentions->bodies) acting[body].push_back(mentions);
       }
-    };
-    add(scene_.bodies);
-    add(scene_.joints);
-    add(scene_.drives);
-    add(scene_.forces);
-    add(scene_.conditions);
+    });
     parameters_ = std::move(observed.parameters);
     bodies_ = std::move(observed.bodies);
     std::vector<std::string> found(bodies_.begin(), bodies_.end());
@@ -169,20 +169,16 @@ class Reach {
   // The scene without bodies that nothing observed depends on, and without elements that act on these alone.
   Scene needed(std::vector<std::string>* left_out) const {
     const auto is_observed = [&](const std::string& body) { return bodies_.contains(body); };
-    const auto is_idle = [&](const auto& element) {
-      return std::ranges::none_of(search_.of(element).bodies, is_observed);
-    };
     std::vector<std::string> gone;
     for (const Body& body : scene_.bodies)
       if (!is_observed(body.name)) gone.push_back(body.name);
     Scene needed = scene_;
     if (gone.empty() || bodies_.empty()) return needed;
     if (left_out) *left_out = std::move(gone);
-    std::erase_if(needed.bodies, is_idle);
-    std::erase_if(needed.joints, is_idle);
-    std::erase_if(needed.drives, is_idle);
-    std::erase_if(needed.forces, is_idle);
-    std::erase_if(needed.conditions, is_idle);
+    for_acting(needed, [&](auto& elements) {
+      std::erase_if(elements,
+                    [&](const auto& element) { return std::ranges::none_of(search_.of(element).bodies, is_observed); });
+    });
     std::erase_if(needed.sensors, [&](const Sensor& sensor) {
       const Mentions read = search_.of(sensor);
       return !read.whole && !std::ranges::all_of(read.bodies, is_observed);
@@ -209,9 +205,9 @@ class Reach {
 };
 
 // The parameters in use in the problem or in one of its load cases, by the names of the problem.
-std::set<std::string> used_in(const Problem& problem) {
+std::set<std::string> used_in(const Problem& problem, bool whole = false) {
   std::set<std::string> used;
-  if (problem.cases.empty() || problem.identification) used = Reach(problem).parameters();
+  if (problem.cases.empty() || problem.identification) used = Reach(problem, whole).parameters();
   for (const CaseSpec& load_case : problem.cases) {
     const Problem of_case = problem_of(problem, load_case);
     const std::set<std::string> names = Reach(of_case).parameters();
@@ -244,11 +240,10 @@ Problem without_measurements(Problem problem) {
 void add_idle(const std::vector<std::string>& variables, const Problem& judged_by, const std::string& list,
               const std::string& what, std::vector<SceneIssue>& issues) {
   const std::set<std::string> used = used_in(judged_by);
-  std::set<std::string> reported;  // when nothing uses them
-  for (const Parameter& parameter : judged_by.scene.parameters)
-    if (!parameter.allow_unused) reported.insert(parameter.name);
+  const std::vector<Parameter>& parameters = judged_by.scene.parameters;
   for (std::size_t i = 0; i < variables.size(); ++i) {
-    if (!reported.contains(variables[i]) || used.contains(variables[i])) continue;
+    const auto parameter = std::ranges::find(parameters, variables[i], &Parameter::name);
+    if (parameter == parameters.end() || parameter->allow_unused || used.contains(variables[i])) continue;
     issues.push_back({child_path(list, i), "'" + variables[i] + "' cannot influence " + what +
                                                ": its derivatives are zero, and it would stay as it is; take it out"});
   }
@@ -270,9 +265,9 @@ std::set<std::string> used_anywhere(Problem problem, bool with_laws) {
 
 }  // namespace
 
-std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
+std::vector<SceneIssue> find_unused_parameters(const Problem& problem, bool whole) {
   std::vector<SceneIssue> issues;
-  const std::set<std::string> used = used_in(problem);
+  const std::set<std::string> used = used_in(problem, whole);
   std::vector<const Parameter*> unused;
   for (const Parameter& parameter : problem.scene.parameters)
     if (!parameter.allow_unused && !used.contains(parameter.name)) unused.push_back(&parameter);

@@ -19,8 +19,8 @@
 
 namespace mbsopt::inline optim {
 
-// The problem must have no other issues.
-std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
+// The problem must have no other issues. whole: something else observes everything.
+std::vector<SceneIssue> find_unused_parameters(const Problem& problem, bool whole = false);
 
 // Sets allow_unused of parameters that only measurements or load cases use. Commands on the problem's own objectives
 // then accept them.
