@@ -87,18 +87,16 @@ class BoundCost final : public RunningCost, public TerminalCost {
     VectorXd p(static_cast<Index>(parameters_.size()));
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       Program::Scratch scratch = parameters_[i].scratch();
-      p(static_cast<Index>(i)) = parameters_[i].value(view(rho), scratch);
+      p(static_cast<Index>(i)) = parameters_[i].value(span_of(rho), scratch);
     }
     return p;
   }
   void add_rho(VecIn rho, const VectorXd& p_bar, VecOut out) const {
-    const std::span<double> gradient(out.data(), static_cast<std::size_t>(out.size()));
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       Program::Scratch scratch = parameters_[i].scratch();
-      parameters_[i].add_gradient(view(rho), p_bar(static_cast<Index>(i)), gradient, scratch);
+      parameters_[i].add_gradient(span_of(rho), p_bar(static_cast<Index>(i)), span_of(out), scratch);
     }
   }
-  static std::span<const double> view(const VecIn& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
 
   std::shared_ptr<const RunningCost> running_;
   std::shared_ptr<const TerminalCost> terminal_;

@@ -19,10 +19,8 @@
 #include "optim/machine/on_threads.hpp"
 #include "optim/machine/stopwatch.hpp"
 #include "optim/objective/curvature_of_run.hpp"
-#include "optim/objective/objective_run.hpp"
 #include "optim/objective/obstructed_parameters.hpp"
 #include "optim/problem/load_cases.hpp"
-#include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt::inline optim {
@@ -181,25 +179,27 @@ Evaluation Evaluator::in_cases(const Eigen::VectorXd& rho, Evaluation (Evaluator
   };
   const Eigen::Index n = static_cast<Eigen::Index>(objectives_.size()), rows = n * static_cast<Eigen::Index>(cases());
   Evaluation all = found[0];
+  all.ok = true;
+  all.message.clear();
   all.rho = rho;
   all.psi.setZero(rows);
   all.psi_rho.setZero(all.has_gradients() ? rows : 0, all.psi_rho.cols());
+  all.pieces.clear();
+  all.warnings.clear();
   all.simulations = 0;
   all.wall_seconds = 0;
-  all.warnings.clear();
   for (std::size_t c = 0; c < cases(); ++c) {
     const Evaluation& e = found[c];
     all.simulations += e.simulations;
     all.wall_seconds += e.wall_seconds;
     for (const std::string& warning : e.warnings) all.warnings.push_back(with_case(c, warning));
     if (!e.ok) {
-      if (all.ok || c == 0) all.message = with_case(c, e.message);
+      if (all.ok) all.message = with_case(c, e.message);
       all.ok = false;
       continue;
     }
     const Eigen::Index first = n * static_cast<Eigen::Index>(c);
     all.psi.segment(first, n) = e.psi;
-    if (c == 0) all.pieces.clear();
     for (ExtremePiece piece : e.pieces) {
       piece.row += first;
       all.pieces.push_back(std::move(piece));
@@ -260,11 +260,8 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
   e.rho = rho;
   e.psi.setZero(static_cast<Eigen::Index>(objectives_.size()));
   if (sweep != Sweep::none) e.psi_rho.setZero(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
-  const bool has_extremes =
-      options_.true_extremes && !frozen && std::ranges::any_of(objectives_, &Objective::is_extreme);
-  e.ok = has_finite_parameters(e) &&
-         (has_extremes ? add_extremes(e, sweep, by_cvodes) : add_simulated(e, sweep, frozen, by_cvodes)) &&
-         add_parameters_only(e) && has_finite_objectives(e);
+  e.ok = has_finite_parameters(e) && add_simulated(e, sweep, frozen, by_cvodes) && add_parameters_only(e) &&
+         has_finite_objectives(e);
   e.wall_seconds = stopwatch.seconds();
   return e;
 }
@@ -296,23 +293,13 @@ bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* fr
     e.message = "stopped before its simulation";
     return false;
   }
+  const RunOptions options{.frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
+  const bool has_extremes =
+      options_.true_extremes && !frozen && std::ranges::any_of(objectives_, &Objective::is_extreme);
   SimulationResult result;
   try {
-    const Mechanism at_rho = mechanism(e.rho, sweep != Sweep::none);
-    const RunOptions options{.frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
-    const bool gathers = gathers_curvature_ && !frozen && sweep == Sweep::forward && !by_cvodes;
-    std::optional<CurvatureOfRun> curvature;
-    const auto simulated = [&](std::span<const Cost> costs) {
-      ++e.simulations;
-      TangentSampling sampling;
-      if (gathers)
-        sampling = curvature.emplace(std::span(objectives_).first(1), variables_).sampling(at_rho, {}, settings);
-      return sweep == Sweep::forward    ? simulate_tlm(at_rho, settings, costs, sampling, options)
-             : sweep == Sweep::backward ? simulate_adjoint(at_rho, settings, costs, options)
-                                        : simulate(at_rho, settings, costs, {}, options);
-    };
-    result = run_objectives(objectives_, at_rho, settings, simulated, options_.progress);
-    if (curvature && result.ok()) e.curvature = curvature->matrix(0, e.rho);
+    result = has_extremes ? extreme_run(e, sweep, settings, options)
+                          : smooth_run(e, sweep, settings, options, gathers_curvature_ && !frozen && !by_cvodes);
   } catch (const SceneError& error) {  // a field that this rho drives out of its range
     e.message = error.what();
     return false;
@@ -328,14 +315,44 @@ bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* fr
   if (!result.ok()) return false;
   e.psi = result.psi;
   if (!e.has_gradients()) return true;
-  e.psi_rho = result.psi_rho(Eigen::all, variables_);
-  for (std::size_t i = 0; i < objectives_.size() && !frozen; ++i)
+  e.psi_rho = result.psi_rho;
+  for (std::size_t i = 0; i < objectives_.size() && !frozen && !has_extremes; ++i)
     if (objectives_[i].needs_simulation() && objectives_[i].mean() && !objectives_[i].is_extreme() &&
         e.psi(static_cast<Eigen::Index>(i)) == 0)
       e.warnings.push_back(
           fmt::format("objective '{}' is a root mean square of 0, where it is not smooth: its gradient is given as 0",
                       objectives_[i].name()));
   return true;
+}
+
+SimulationResult Evaluator::smooth_run(Evaluation& e, Sweep sweep, const SimulationSettings& settings,
+                                       const RunOptions& options, bool gathers) const {
+  const Mechanism at_rho = mechanism(e.rho, sweep != Sweep::none);
+  std::optional<CurvatureOfRun> curvature;
+  const auto simulated = [&](std::span<const Cost> costs) {
+    ++e.simulations;
+    TangentSampling sampling;
+    if (gathers && sweep == Sweep::forward)
+      sampling = curvature.emplace(std::span(objectives_).first(1), variables_).sampling(at_rho, {}, settings);
+    return sweep == Sweep::forward    ? simulate_tlm(at_rho, settings, costs, sampling, options)
+           : sweep == Sweep::backward ? simulate_adjoint(at_rho, settings, costs, options)
+                                      : simulate(at_rho, settings, costs, {}, options);
+  };
+  SimulationResult result = run_objectives(objectives_, at_rho, settings, simulated, options_.progress);
+  if (curvature && result.ok()) e.curvature = curvature->matrix(0, e.rho);
+  if (result.psi_rho.size() > 0) result.psi_rho = Eigen::MatrixXd(result.psi_rho(Eigen::all, variables_));
+  return result;
+}
+
+// A run for the steps, the peaks on them, and with derivatives a sweep in which each peak is a sample at its instant.
+SimulationResult Evaluator::extreme_run(Evaluation& e, Sweep sweep, const SimulationSettings& settings,
+                                        const RunOptions& options) const {
+  ExtremeRun run(objectives_, settings, options);
+  if (run.find(mechanism(e.rho, false)) && sweep != Sweep::none)
+    run.differentiate(mechanism(e.rho, true), sweep == Sweep::backward, variables_);
+  e.simulations += run.simulations;
+  e.pieces = std::move(run.pieces);
+  return std::move(run.result);
 }
 
 std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd& rho) const {
@@ -346,49 +363,15 @@ std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd&
     for (const auto& of_case : found) all.insert(all.end(), of_case.begin(), of_case.end());
     return all;
   }
-  const std::vector<std::optional<double>> none(objectives_.size());
-  if (std::ranges::none_of(objectives_, &Objective::is_extreme)) return none;
-  const Mechanism at_rho = mechanism(rho, false);
+  std::vector<std::optional<double>> values(objectives_.size());
+  if (std::ranges::none_of(objectives_, &Objective::is_extreme)) return values;
   const Evaluation e = run(rho, Sweep::none, nullptr);  // the costs decide on the panels of a solved run
-  if (options_.true_extremes) {
-    std::vector<std::optional<double>> values(objectives_.size());
-    for (std::size_t i = 0; i < values.size() && e.ok; ++i)
-      if (objectives_[i].is_extreme()) values[i] = e.psi(static_cast<Eigen::Index>(i));
-    return values;
-  }
-  return e.ok ? true_extremes(objectives_, at_rho, scene_.simulation, e.steps, options_.progress) : none;
-}
-
-// A run for the steps, the peaks on them, and with derivatives a sweep in which each peak is a sample at its instant.
-bool Evaluator::add_extremes(Evaluation& e, Sweep sweep, bool by_cvodes) const {
-  const SimulationSettings settings = by_cvodes ? with_cvodes(scene_.simulation) : scene_.simulation;
-  if (options_.progress && !options_.progress(settings.start_time)) {
-    e.message = "stopped before its simulation";
-    return false;
-  }
-  ExtremeRun run(objectives_, settings, {.progress = options_.progress, .exact_stages = options_.exact_stages});
-  try {
-    bool ok = run.find(mechanism(e.rho, false));
-    if (ok && sweep != Sweep::none)
-      ok = run.differentiate(mechanism(e.rho, true), sweep == Sweep::backward, variables_);
-    e.statistics = run.result().statistics;
-    e.steps = run.result().steps;
-    e.y_initial = run.result().y_initial;
-    e.message = run.result().message;
-    e.simulations += run.simulations();
-    e.warnings = simulation_warnings(scene_, settings, e.statistics, ok);
-    if (!ok) return false;
-    e.psi = run.result().psi;
-    if (sweep != Sweep::none) e.psi_rho = run.result().psi_rho;
-    e.pieces = run.pieces();
-    return true;
-  } catch (const SceneError& error) {
-    e.message = error.what();
-    return false;
-  } catch (const NoMotion& error) {
-    e.message = error.what();
-    return false;
-  }
+  if (!e.ok) return values;
+  if (!options_.true_extremes)
+    return true_extremes(objectives_, mechanism(rho, false), scene_.simulation, e.steps, options_.progress);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (objectives_[i].is_extreme()) values[i] = e.psi(static_cast<Eigen::Index>(i));
+  return values;
 }
 
 bool Evaluator::add_parameters_only(Evaluation& e) const {
@@ -399,21 +382,15 @@ bool Evaluator::add_parameters_only(Evaluation& e) const {
         e.psi(i) += objective.parameters_only(e.rho, options_.user_forces);
         continue;
       }
-      if (objective.has_response()) {
-        const std::vector<FrequencyResponse::Peak> peaks =
-            objective.response_peaks(e.rho, options_.user_forces, variables_);
-        e.psi(i) = peaks.front().value;
-        e.psi_rho.row(i) = peaks.front().gradient.transpose();
-        for (const FrequencyResponse::Peak& peak : peaks)
-          if (peaks.size() > 1) e.pieces.push_back({i, 1, peak.value, peak.gradient, peak.frequency});
-        continue;
-      }
-      Eigen::VectorXd gradient = Eigen::VectorXd::Zero(e.rho.size());
       std::vector<std::string> doubts;
-      e.psi(i) += objective.add_parameters_only_gradient(e.rho, gradient, options_.user_forces, &doubts);
+      const std::vector<FrequencyResponse::Peak> peaks =
+          objective.parameters_only_gradients(e.rho, options_.user_forces, variables_, &doubts);
+      e.psi(i) += peaks.front().value;
+      e.psi_rho.row(i) += peaks.front().gradient.transpose();
+      for (const FrequencyResponse::Peak& peak : peaks)
+        if (peaks.size() > 1) e.pieces.push_back({i, 1, peak.value, peak.gradient, peak.frequency});
       for (const std::string& doubt : doubts)
         e.warnings.push_back(fmt::format("objective '{}': {}", objective.name(), doubt));
-      e.psi_rho.row(i) += gradient(variables_).transpose();
     }
   } catch (const std::runtime_error& error) {  // of an eigenvalue
     e.message = error.what();
@@ -469,9 +446,13 @@ void Evaluator::add_differences(Evaluation& e) const {
   e.wall_seconds += stopwatch.seconds();
 }
 
+bool Evaluator::is_last(const Eigen::VectorXd& rho) const {
+  return last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho;
+}
+
 Evaluation Evaluator::values(const Eigen::VectorXd& rho) {
   if (!cases_.empty()) return in_cases(rho, &Evaluator::values);
-  if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho) return last_;
+  if (is_last(rho)) return last_;
   last_ = run(rho, Sweep::none, nullptr);
   simulations_ += last_.simulations;
   return last_;
@@ -521,9 +502,7 @@ GradientMethod Evaluator::chosen_method(std::string& choice) const {
 
 Evaluation Evaluator::gradients(const Eigen::VectorXd& rho) {
   if (!cases_.empty()) return in_cases(rho, &Evaluator::gradients);
-  if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
-      (last_.has_gradients() || !last_.ok))
-    return last_;
+  if (is_last(rho) && (last_.has_gradients() || !last_.ok)) return last_;
   if (simulated_ > 0 && !has_differentiated_) {
     // At other values than the scene's own, the loop may close as a structure that cannot move.
     const Eigen::VectorXd own = start();

@@ -22,8 +22,8 @@
 #include <vector>
 
 #include "core/simulate/simulation.hpp"
-#include "optim/objective/extreme_run.hpp"
 #include "optim/objective/objective.hpp"
+#include "optim/objective/objective_run.hpp"
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/problem.hpp"
 
@@ -152,9 +152,13 @@ class Evaluator {
   // Parts of run(). They return false if the point cannot be evaluated; e.message then gives the reason.
   bool has_finite_parameters(Evaluation& e) const;
   bool add_simulated(Evaluation& e, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const;
-  bool add_extremes(Evaluation& e, Sweep sweep, bool by_cvodes) const;
+  SimulationResult smooth_run(Evaluation& e, Sweep sweep, const SimulationSettings& settings, const RunOptions& options,
+                              bool gathers) const;
+  SimulationResult extreme_run(Evaluation& e, Sweep sweep, const SimulationSettings& settings,
+                               const RunOptions& options) const;
   bool add_parameters_only(Evaluation& e) const;
   bool has_finite_objectives(Evaluation& e) const;
+  bool is_last(const Eigen::VectorXd& rho) const;
   GradientMethod chosen_method(std::string& choice) const;
   void add_differences(Evaluation& e) const;
   void find_unused();

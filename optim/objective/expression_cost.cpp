@@ -176,9 +176,6 @@ SecondOrder CostExpression::second_order(const Mechanism& mechanism, const State
       U(input, j) = y_bar.dot(y_rho.col(k)) + rho_bar(k);
     }
   }
-  const auto span_of = [](Eigen::VectorXd& x) {
-    return std::span<double>(x.data(), static_cast<std::size_t>(x.size()));
-  };
   Program::Scratch scratch = program.scratch();
   Eigen::VectorXd e_u, e_uj, direction(u.size());
   Eigen::MatrixXd e_uu = Eigen::MatrixXd::Zero(u.size(), u.size());

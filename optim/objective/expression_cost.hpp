@@ -11,6 +11,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/expression/program.hpp"
@@ -26,6 +27,9 @@ Symbols cost_symbols(const Scene& scene);
 Symbols parameter_symbols(const Scene& scene);
 // Parameters, then t, with definitions and signals.
 Symbols time_symbols(const Scene& scene);
+
+// The numbers of a vector, as programs take them.
+auto span_of(auto& x) { return std::span(x.data(), static_cast<std::size_t>(x.size())); }
 
 // A scalar e of u = (parameters, sensors) along the tangents U = du/drho of a motion.
 struct SecondOrder {

@@ -54,8 +54,6 @@ class Integrand final : public PointCost {
   double k_, x0_;
 };
 
-std::span<const double> view(const Eigen::VectorXd& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
-
 }  // namespace
 
 Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec.name), spec_(spec) {
@@ -211,23 +209,23 @@ double Objective::parameters_only(const Eigen::VectorXd& rho, const FollowedMode
   if (response_) return named(name_, [&] { return response_->value(rho, forces); });
   if (!parameters_only_) return 0;
   Program::Scratch scratch = parameters_only_->scratch();
-  return parameters_only_->value(view(rho), scratch);
+  return parameters_only_->value(span_of(rho), scratch);
 }
 
-std::vector<FrequencyResponse::Peak> Objective::response_peaks(const Eigen::VectorXd& rho,
-                                                               const FollowedMode::UserForces& forces,
-                                                               const std::vector<int>& variables) const {
-  return named(name_, [&] { return response_->peaks(rho, forces, variables); });
-}
-
-double Objective::add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar,
-                                               const FollowedMode::UserForces& forces,
-                                               std::vector<std::string>* warnings) const {
-  if (mode_) return named(name_, [&] { return mode_->add_gradient(rho, forces, rho_bar, warnings); });
-  if (!parameters_only_) return 0;
-  Program::Scratch scratch = parameters_only_->scratch();
-  const std::span<double> gradient(rho_bar.data(), static_cast<std::size_t>(rho_bar.size()));
-  return parameters_only_->add_gradient(view(rho), 1, gradient, scratch);
+std::vector<FrequencyResponse::Peak> Objective::parameters_only_gradients(const Eigen::VectorXd& rho,
+                                                                          const FollowedMode::UserForces& forces,
+                                                                          const std::vector<int>& variables,
+                                                                          std::vector<std::string>* warnings) const {
+  if (response_) return named(name_, [&] { return response_->peaks(rho, forces, variables); });
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(rho.size());
+  double value = 0;
+  if (mode_) {
+    value = named(name_, [&] { return mode_->add_gradient(rho, forces, gradient, warnings); });
+  } else if (parameters_only_) {
+    Program::Scratch scratch = parameters_only_->scratch();
+    value = parameters_only_->add_gradient(span_of(rho), 1, span_of(gradient), scratch);
+  }
+  return {{0, value, gradient(variables)}};
 }
 
 void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const std::vector<int>& variables,
@@ -235,13 +233,13 @@ void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const st
   if (!parameters_only_) return;
   Program::Scratch scratch = parameters_only_->scratch();
   Eigen::VectorXd direction(rho.size()), gradient(rho.size()), slope(rho.size());
-  const auto all = [](Eigen::VectorXd& x) { return std::span<double>(x.data(), static_cast<std::size_t>(x.size())); };
   for (std::size_t j = 0; j < variables.size(); ++j) {
     direction.setZero();
     gradient.setZero();
     slope.setZero();
     direction(variables[j]) = 1;
-    parameters_only_->add_gradient_tangent(view(rho), all(direction), 1, all(gradient), all(slope), scratch);
+    parameters_only_->add_gradient_tangent(span_of(rho), span_of(direction), 1, span_of(gradient), span_of(slope),
+                                           scratch);
     for (std::size_t i = 0; i < variables.size(); ++i)
       H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += slope(variables[i]);
   }

@@ -83,23 +83,18 @@ class Objective {
   bool is_sum_of_squares() const;
   double exponent(const ObjectivePart& part) const { return part.side * sharpness_; }  // k of an extreme
   bool is_of_linear_motion() const { return mode_ || response_; }  // an eigenvalue, a frequency response
-  bool has_response() const { return response_ != nullptr; }
-  // The response and its gradient in these variables; of the largest amplitude with the lower peaks after it. Errors
-  // are std::runtime_error.
-  std::vector<FrequencyResponse::Peak> response_peaks(const Eigen::VectorXd& rho,
-                                                      const FollowedMode::UserForces& forces,
-                                                      const std::vector<int>& variables) const;
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
   const ObjectiveSpec& spec() const { return spec_; }  // of one that is not
   // Returns whether it is a sum of parts whose second derivatives in parameters and sensors are 0.
   bool is_linear() const;
 
-  // The part that depends on the parameters alone, and += d/drho. It includes an eigenvalue, and without its gradient a
-  // response; their errors are std::runtime_error.
+  // The part that depends on the parameters alone; it includes an eigenvalue and a response. With its gradient in these
+  // variables, the largest amplitude of a response is the first of its peaks. Errors are std::runtime_error.
   double parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces = {}) const;
-  double add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar,
-                                      const FollowedMode::UserForces& forces = {},
-                                      std::vector<std::string>* warnings = nullptr) const;
+  std::vector<FrequencyResponse::Peak> parameters_only_gradients(const Eigen::VectorXd& rho,
+                                                                 const FollowedMode::UserForces& forces,
+                                                                 const std::vector<int>& variables,
+                                                                 std::vector<std::string>* warnings = nullptr) const;
   void add_parameters_only_hessian(const Eigen::VectorXd& rho, const std::vector<int>& variables,
                                    Eigen::MatrixXd& H) const;
 

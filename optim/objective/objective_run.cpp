@@ -4,85 +4,119 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
+#include <numbers>
 
-#include "optim/objective/peaks.hpp"
+#include "core/cvodes/cvodes.hpp"
+#include "core/driven/driven_simulation.hpp"
 
 namespace mbsopt::inline optim {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
 namespace {
 
-// The integral of one part of an objective.
-struct Integral {
-  const Objective* objective;
-  Eigen::Index row;  // of the objective
-  ObjectivePart part;
-  double x0 = 0;
-};
+using Sweep = std::function<SimulationResult(std::span<const Cost>)>;
+using Progress = std::function<bool(double t)>;
 
-std::vector<Integral> integrals_of(const std::vector<Objective>& objectives) {
-  std::vector<Integral> integrals;
+// The parts of the objectives that need a simulation.
+std::vector<ObjectiveMean> means_of(const std::vector<Objective>& objectives, bool extremes, bool others) {
+  std::vector<ObjectiveMean> means;
   for (std::size_t i = 0; i < objectives.size(); ++i)
-    if (objectives[i].needs_simulation())
+    if (objectives[i].needs_simulation() && (objectives[i].is_extreme() ? extremes : others))
       for (const ObjectivePart& part : objectives[i].parts())
-        integrals.push_back({&objectives[i], static_cast<Eigen::Index>(i), part});
-  return integrals;
+        means.push_back({&objectives[i], static_cast<Index>(i), part});
+  return means;
 }
 
-// The extreme of each objective's expression on the side of its part. There is none for side 0, or if the run fails.
-std::vector<std::optional<double>> extremes_of(const std::vector<Integral>& integrals, const Mechanism& mechanism,
-                                               const SimulationSettings& settings, const StepSequence& steps,
-                                               const std::function<bool(double t)>& progress) {
-  std::vector<std::optional<double>> values(integrals.size());
+std::vector<Watched> watched_in(const std::vector<ObjectiveMean>& extremes, const Mechanism& mechanism) {
   std::vector<Watched> watched;
-  std::vector<std::size_t> of;
-  for (std::size_t i = 0; i < integrals.size(); ++i)
-    if (const int side = integrals[i].part.side; side != 0) {
-      watched.push_back({side, integrals[i].objective->expression(mechanism)});
-      of.push_back(i);
-    }
-  const std::vector<std::vector<Peak>> found = peaks(watched, mechanism, settings, steps, progress);
-  for (std::size_t k = 0; k < found.size(); ++k) values[of[k]] = found[k].front().value;
-  return values;
+  for (const auto& [objective, row, part, x0] : extremes)
+    watched.push_back({part.side, objective->expression(mechanism)});
+  return watched;
+}
+
+// Sets x0 of each smooth extreme to the true one, or to 0 if the run fails.
+void set_x0(std::vector<ObjectiveMean>& means, const Mechanism& mechanism, const SimulationSettings& settings,
+            const StepSequence& steps, const Progress& progress) {
+  std::vector<ObjectiveMean> extremes;
+  std::ranges::copy_if(means, std::back_inserter(extremes), [](const ObjectiveMean& m) { return m.part.side != 0; });
+  const std::vector<std::vector<Peak>> found =
+      peaks(watched_in(extremes, mechanism), mechanism, settings, steps, progress);
+  std::size_t k = 0;
+  for (ObjectiveMean& mean : means) mean.x0 = mean.part.side != 0 && k < found.size() ? found[k++].front().value : 0;
 }
 
 // Whether the exponentials of smooth extremes stayed in the range of numbers.
-bool in_range(const std::vector<Integral>& integrals, const Eigen::VectorXd& values) {
+bool in_range(const std::vector<ObjectiveMean>& means, const VectorXd& values) {
   constexpr double kSmall = 1e-250, kLarge = 1e250;  // the range of exp and its sums, with room for factors
-  for (std::size_t k = 0; k < integrals.size(); ++k) {
-    const double I = std::abs(values(static_cast<Eigen::Index>(k)));
-    if (integrals[k].part.side != 0 && !(I > kSmall && I < kLarge)) return false;
+  for (std::size_t k = 0; k < means.size(); ++k) {
+    const double I = std::abs(values(static_cast<Index>(k)));
+    if (means[k].part.side != 0 && !(I > kSmall && I < kLarge)) return false;
   }
   return true;
+}
+
+std::vector<Cost> together(std::span<const Cost> costs, const std::vector<Cost>& others) {
+  std::vector<Cost> all(costs.begin(), costs.end());
+  all.insert(all.end(), others.begin(), others.end());
+  return all;
+}
+
+// The pieces of one side. values: of each peak at its instant and at its top, from `first` on, which goes on to the
+// next side. The top is higher but for kinks.
+std::vector<ExtremePiece> pieces_of(const ObjectiveMean& side, const std::vector<Peak>& peaks, const VectorXd& values,
+                                    const MatrixXd& values_rho, Index& first) {
+  const auto [sign, factor] = side.part;
+  std::vector<ExtremePiece> found;
+  for (const Peak& peak : peaks) {
+    const Index best = sign * values(first) >= sign * values(first + 1) ? first : first + 1;
+    found.push_back({side.row, static_cast<int>(sign * factor), factor * values(best),
+                     factor * values_rho.row(best).transpose(), peak.t});
+    first += 2;
+  }
+  return found;
+}
+
+// max a + max b is the largest of all a + b: the highest of these pairs.
+std::vector<ExtremePiece> pairs_of(const std::vector<ExtremePiece>& some, const std::vector<ExtremePiece>& others) {
+  const double apart = std::numbers::sqrt2;  // no two pairs of instants have the same sum then
+  std::vector<ExtremePiece> pairs;
+  for (const ExtremePiece& a : some)
+    for (const ExtremePiece& b : others)
+      pairs.push_back({a.row, a.side, a.value + b.value, a.gradient + b.gradient, a.t + apart * b.t});
+  std::ranges::stable_sort(pairs, std::greater(), &ExtremePiece::value);
+  pairs.resize(std::min(pairs.size(), 2 * kMostPeaks));
+  return pairs;
 }
 
 }  // namespace
 
 SimulationResult run_objectives(const std::vector<Objective>& objectives, const Mechanism& mechanism,
-                                const SimulationSettings& settings,
-                                const std::function<SimulationResult(std::span<const Cost>)>& sweep,
-                                const std::function<bool(double t)>& progress) {
-  std::vector<Integral> integrals = integrals_of(objectives);
+                                const SimulationSettings& settings, const Sweep& sweep, const Progress& progress,
+                                bool smooth_extremes) {
+  std::vector<ObjectiveMean> means = means_of(objectives, smooth_extremes, true);
   const auto costs = [&] {
     std::vector<Cost> all;
-    for (const Integral& i : integrals) all.push_back(i.objective->cost(mechanism, i.part, i.x0, progress));
+    for (const ObjectiveMean& m : means) all.push_back(m.objective->cost(mechanism, m.part, m.x0, progress));
     return all;
   };
   SimulationResult result = sweep(costs());
   const bool complete =
       result.ok() || (result.status == SimulationStatus::not_finite && result.last_good_time >= settings.end_time);
-  if (complete && !in_range(integrals, result.psi)) {
-    const std::vector<std::optional<double>> extremes =
-        extremes_of(integrals, mechanism, settings, result.steps, progress);
-    for (std::size_t k = 0; k < integrals.size(); ++k) integrals[k].x0 = extremes[k].value_or(0);
+  if (complete && !in_range(means, result.psi)) {
+    set_x0(means, mechanism, settings, result.steps, progress);
     result = sweep(costs());
   }
   if (!result.ok()) return result;
-  const Eigen::VectorXd I = result.psi;
-  const Eigen::MatrixXd I_rho = result.psi_rho;
-  result.psi.setZero(static_cast<Eigen::Index>(objectives.size()));
+  const VectorXd I = result.psi;
+  const MatrixXd I_rho = result.psi_rho;
+  result.psi.setZero(static_cast<Index>(objectives.size()));
   if (I_rho.size() > 0) result.psi_rho.setZero(result.psi.size(), I_rho.cols());
-  Eigen::Index k = 0;
-  for (const auto& [objective, row, part, x0] : integrals) {
+  Index k = 0;
+  for (const auto& [objective, row, part, x0] : means) {
     const Derivatives mean = objective->of_integral(I(k), part, x0);
     if (part.side != 0 && !std::isfinite(mean.value)) {
       result.status = SimulationStatus::not_finite;
@@ -99,20 +133,102 @@ SimulationResult run_objectives(const std::vector<Objective>& objectives, const 
   return result;
 }
 
+ExtremeRun::ExtremeRun(const std::vector<Objective>& objectives, const SimulationSettings& settings,
+                       const RunOptions& options)
+    : objectives_(objectives), settings_(settings), options_(options), sides_(means_of(objectives, true, false)) {}
+
+bool ExtremeRun::find(const Mechanism& mechanism) {
+  const std::vector<Watched> watched = watched_in(sides_, mechanism);
+  std::vector<Cost> shapes;  // of the extremes, which panels of a solved run resolve
+  for (std::size_t k = 0; k < sides_.size() && may_be_solved(mechanism, settings_); ++k) {
+    Cost& shape = shapes.emplace_back();
+    shape.name = sides_[k].objective->name();
+    shape.running = watched[k].x;
+  }
+  const auto simulated = [&](std::span<const Cost> costs) {
+    ++simulations;
+    return simulate(mechanism, settings_, together(costs, shapes), {}, options_);
+  };
+  result = run_objectives(objectives_, mechanism, settings_, simulated, options_.progress, false);
+  if (!result.ok()) return false;
+  peaks_ = peaks(watched, mechanism, settings_, result.steps, options_.progress);
+  if (peaks_.size() < sides_.size()) {
+    result.status = SimulationStatus::stopped;
+    result.message = "the run that looks for extremes failed";
+    return false;
+  }
+  for (std::size_t k = 0; k < sides_.size(); ++k)
+    result.psi(sides_[k].row) += sides_[k].part.factor * peaks_[k].front().value;
+  return true;
+}
+
+bool ExtremeRun::differentiate(const Mechanism& mechanism, bool backward, const std::vector<int>& variables) {
+  RunOptions on_steps = options_;
+  if (!is_cvodes(settings_.integrator.type)) on_steps.frozen = &result.steps;
+  std::vector<Cost> tops;  // each peak at its instant and at its top
+  for (std::size_t k = 0; k < sides_.size(); ++k) {
+    const std::shared_ptr<const PointCost> x = sides_[k].objective->expression(mechanism);
+    for (const Peak& peak : peaks_[k])
+      for (const double t : {peak.t, peak.top}) {
+        Cost& cost = tops.emplace_back();
+        cost.name = sides_[k].objective->name();
+        cost.samples.push_back({t, x});
+      }
+  }
+  VectorXd values;  // of the tops
+  MatrixXd values_rho;
+  const auto swept = [&](std::span<const Cost> costs) {
+    ++simulations;
+    const std::vector<Cost> all = together(costs, tops);
+    SimulationResult r = backward ? simulate_adjoint(mechanism, settings_, all, on_steps)
+                                  : simulate_tlm(mechanism, settings_, all, {}, on_steps);
+    const Index n = static_cast<Index>(tops.size());
+    if (r.ok()) values = r.psi.tail(n), values_rho = r.psi_rho.bottomRows(n)(Eigen::all, variables);
+    return r;
+  };
+  const SimulationResult run = run_objectives(objectives_, mechanism, settings_, swept, options_.progress, false);
+  result.status = run.status;
+  result.message = run.message;
+  if (!run.ok()) return false;
+  result.statistics.jumps = run.statistics.jumps;
+  result.statistics.gradient_quadrature = run.statistics.gradient_quadrature;
+  result.psi = run.psi;
+  result.psi_rho = run.psi_rho(Eigen::all, variables);
+  set_extremes(values, values_rho);
+  return true;
+}
+
+void ExtremeRun::set_extremes(const VectorXd& values, const MatrixXd& values_rho) {
+  Index first = 0;
+  for (std::size_t k = 0; k < sides_.size(); ++k) {
+    const Index row = sides_[k].row;
+    std::vector<ExtremePiece> found = pieces_of(sides_[k], peaks_[k], values, values_rho, first);
+    if (k + 1 < sides_.size() && sides_[k + 1].row == row) {  // peak to peak
+      ++k;
+      found = pairs_of(found, pieces_of(sides_[k], peaks_[k], values, values_rho, first));
+    }
+    std::ranges::stable_sort(found, std::greater(), [](const ExtremePiece& p) { return p.side * p.value; });
+    result.psi(row) = found.front().value;
+    result.psi_rho.row(row) = found.front().gradient.transpose();
+    std::ranges::move(found, std::back_inserter(pieces));
+  }
+}
+
 std::vector<std::optional<double>> true_extremes(const std::vector<Objective>& objectives, const Mechanism& mechanism,
                                                  const SimulationSettings& settings, const StepSequence& steps,
-                                                 const std::function<bool(double t)>& progress) {
-  const std::vector<Integral> integrals = integrals_of(objectives);
-  const std::vector<std::optional<double>> extremes = extremes_of(integrals, mechanism, settings, steps, progress);
+                                                 const Progress& progress) {
+  const std::vector<ObjectiveMean> sides = means_of(objectives, true, false);
+  const std::vector<std::vector<Peak>> found =
+      peaks(watched_in(sides, mechanism), mechanism, settings, steps, progress);
   std::vector<std::optional<double>> values(objectives.size());
-  for (std::size_t k = 0; k < integrals.size(); ++k) {
-    std::optional<double>& value = values[static_cast<std::size_t>(integrals[k].row)];
-    if (extremes[k]) value = value.value_or(0) + integrals[k].part.factor * *extremes[k];
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    std::optional<double>& value = values[static_cast<std::size_t>(sides[k].row)];
+    value = value.value_or(0) + sides[k].part.factor * found[k].front().value;
   }
   return values;
 }
 
-std::vector<std::string> missed_peaks(const std::vector<Objective>& objectives, const Eigen::VectorXd& psi,
+std::vector<std::string> missed_peaks(const std::vector<Objective>& objectives, const VectorXd& psi,
                                       const std::vector<std::optional<double>>& true_values) {
   constexpr double kShortest = 25;  // d: a peak of 1e-11 of the run is none
   std::vector<std::string> sentences;
