@@ -12,7 +12,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
-#include "core/mechanism/derivative_blocks.hpp"
+#include "core/mechanism/coupling.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/scene_path.hpp"
 #include "core/start/model_warnings.hpp"

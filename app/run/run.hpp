@@ -102,7 +102,7 @@ inline constexpr const char* kWorkIsDone = "with the work of dampers, actuators 
 // Says which bodies do not affect the answer and are not simulated. judged_by: "objective", "measurement"
 void say_left_out(Run& run, const std::vector<std::string>& bodies, const char* judged_by);
 // Adds counts of runs with derivatives to result.simulation, which must exist: blocks evaluated
-// (core/mechanism/derivative_blocks.hpp), and numbers of the model that parameters change.
+// (core/mechanism/coupling.hpp), and numbers of the model that parameters change.
 void add_derivative_counts(Run& run, const Scene& simulated, const SimulationStatistics& statistics);
 
 }  // namespace mbsopt::inline app

@@ -5,7 +5,7 @@
 
 #include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
-#include "core/mechanism/derivative_blocks.hpp"
+#include "core/mechanism/coupling.hpp"
 #include "core/mechanism/sensor_gradient.hpp"
 
 namespace mbsopt {

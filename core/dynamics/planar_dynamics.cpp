@@ -6,7 +6,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/dynamics/space.hpp"
 #include "core/force/forces.hpp"
-#include "core/mechanism/derivative_blocks.hpp"
+#include "core/mechanism/coupling.hpp"
 
 namespace mbsopt {
 namespace {
