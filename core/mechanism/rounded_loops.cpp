@@ -59,12 +59,11 @@ class Loops {
   // Looks for redundant equations where the joints are closed: independent, open or none.
   Outcome look() {
     Position p = guess();
-    double largest = INFINITY;
-    const std::vector<SparseEntry> J = d_.n < kManyBodies ? std::vector<SparseEntry>() : entries(p, largest);
-    const bool is_closed = largest <= exact(p), is_near = is_closed || close(p);
-    if (!is_closed && stays_open(p)) return Outcome::open;
-    const bool independent = is_closed ? rank(J, threshold_) == rows_ : is_near && p.L.cols() == 0;
-    return independent ? Outcome::independent : Outcome::none;
+    evaluate(p);
+    if (d_.n >= kManyBodies && is_closed(p)) return rank(p, threshold_) == rows_ ? Outcome::independent : Outcome::none;
+    const bool is_near = close(p);
+    if (stays_open(p)) return Outcome::open;
+    return is_near && p.L.cols() == 0 ? Outcome::independent : Outcome::none;
   }
 
   // Finds the correction x of the numbers that closes the loops, unless they have all digits or stay open.
@@ -153,30 +152,20 @@ class Loops {
     return std::max(kExact, 1e-15 * p.q.lpNorm<Eigen::Infinity>() / lengths_.whole);
   }
 
-  // Decides for many bodies, in linear time, whether the guess shows no rounding.
-  bool agrees_at_sight(const Position& guess) const {
+  bool is_closed(const Position& p) const { return p.Phi.lpNorm<Eigen::Infinity>() <= exact(p); }
+
+  // Decides for many bodies, without dense decompositions, whether the guess shows no rounding.
+  bool agrees_at_sight(Position& guess) const {
     if (d_.n < kManyBodies) return false;
-    double largest = 0;
-    const std::vector<SparseEntry> J = entries(guess, largest);
-    const int seen = rank(J, threshold_);
-    return seen == rows_ || (largest <= exact(guess) && rank(J, kExact) == seen);
+    evaluate(guess);
+    const int seen = rank(guess, threshold_);
+    return seen == rows_ || (is_closed(guess) && rank(guess, kExact) == seen);
   }
-  std::vector<SparseEntry> entries(const Position& p, double& largest) const {  // of J; the largest |Phi|
+  int rank(const Position& p, double threshold) const {
     std::vector<SparseEntry> J;
-    largest = 0;
-    for_each_equation(p.q, [&](Index row, const Constraint& c, double phi, const std::array<Vec<6>, 2>& gradient) {
-      largest = std::max(largest, std::abs(phi));
-      for (const int side : {0, 1}) {
-        const int body = side == 0 ? c.body1 : c.body2;
-        if (body == 0) continue;
-        const OfBody columns = in_columns(body, gradient[at(side)]);
-        for (int k = 0; k < width_; ++k)
-          if (columns(k) != 0) J.push_back({static_cast<int>(row), width_ * (body - 1) + k, columns(k)});
-      }
-    });
-    return J;
-  }
-  int rank(const std::vector<SparseEntry>& J, double threshold) const {
+    for (int i = 0; i < rows_; ++i)
+      for (int k = 0; k < width_ * d_.n; ++k)
+        if (p.J(i, k) != 0) J.push_back({i, k, p.J(i, k)});
     return row_dependence(rows_, d_.n, width_, J, threshold).rank;
   }
 
