@@ -32,31 +32,22 @@ double size_of(const VectorXd& y, int n) {
   return apart > 0 ? apart : away > 0 ? away : 1.0;
 }
 
-// The free directions N and P, and the derivatives of the constraints in the inputs.
+// The free directions N and P, and the derivatives of the constraints in the inputs. `unit` holds those of q.
 struct FreeDirections {
   MatrixXd N, P, phi_rho;
 };
 
-FreeDirections free_directions(const MechanismData& d, const StatePoint& at, double length) {
+FreeDirections free_directions(const MechanismData& d, const StatePoint& at, const VectorXd& unit) {
   AssemblyEquations position(d, AssemblyLevel::position, at.t), velocity(d, AssemblyLevel::velocity, at.t);
   position.start_branches(at.y);
   velocity.start_branches(at.y);
-  const Index rows = d.m + d.n, half = StateLayout{d.n}.positions();  // without conditions on sensors
+  const Index rows = d.m + d.n, half = unit.size();  // without conditions on sensors
   const AssemblyEquations::Gradients F = position.gradients(at.y), G = velocity.gradients(at.y);
-  VectorXd unit = VectorXd::Ones(half);
-  for (int i = 1; i <= d.n; ++i) unit.segment<3>(StateLayout{d.n}.q(i)).setConstant(length);
-  MatrixXd J = F.y.topLeftCorner(rows, half) * unit.asDiagonal();
-  MatrixXd J_dot = G.y.topLeftCorner(rows, half) * unit.asDiagonal();
-  for (Index r = 0; r < rows; ++r) {
-    const double norm = J.row(r).norm();
-    if (norm > 0) {
-      J.row(r) /= norm;
-      J_dot.row(r) /= norm;
-    }
-  }
+  const UnitRows J(F.y.topLeftCorner(rows, half) * unit.asDiagonal());
+  const MatrixXd J_dot = J.scale.asDiagonal() * G.y.topLeftCorner(rows, half) * unit.asDiagonal();
   FreeDirections x;
-  x.N = null_space(J, UnitRows::kRankThreshold);
-  x.P = -OrthogonalDecomposition(J, UnitRows::kRankThreshold).solve(J_dot * x.N);
+  x.N = null_space(J.J, UnitRows::kRankThreshold);
+  x.P = -OrthogonalDecomposition(J.J, UnitRows::kRankThreshold).solve(J_dot * x.N);
   x.phi_rho = F.rho.topRows(rows).cwiseAbs() + G.rho.topRows(rows).cwiseAbs();
   return x;
 }
@@ -122,7 +113,9 @@ Linearisation linearise(const Mechanism& mechanism, const FormulationSettings& f
 
   Linearisation x;
   x.length = size_of(at.y, d.n);
-  const FreeDirections free = free_directions(d, at, x.length);
+  VectorXd unit = VectorXd::Ones(half);
+  for (int i = 1; i <= d.n; ++i) unit.segment<3>(layout.q(i)).setConstant(x.length);
+  const FreeDirections free = free_directions(d, at, unit);
   const Index f = free.N.cols();
   for (const int k : inputs) {
     if (!free.phi_rho.col(k).isZero(0))
@@ -130,8 +123,6 @@ Linearisation linearise(const Mechanism& mechanism, const FormulationSettings& f
           "the input moves the joints or drives; only what acts through forces, masses or "
           "inertias can be an input");
   }
-  VectorXd unit = VectorXd::Ones(half);
-  for (int i = 1; i <= d.n; ++i) unit.segment<3>(layout.q(i)).setConstant(x.length);
   x.basis = MatrixXd::Zero(2 * half, 2 * f);
   x.basis.topLeftCorner(half, f) = x.basis.bottomRightCorner(half, f) = unit.asDiagonal() * free.N;
   x.basis.bottomLeftCorner(half, f) = unit.asDiagonal() * free.P;
