@@ -16,9 +16,7 @@ struct TimeLaw {
   std::shared_ptr<const std::array<Program, 3>> programs;  // f, f_t, f_tt; inputs: all parameters, then t
   bool smooth = false;                                     // a spline through samples, which needs no search for jumps
 
-  struct Jet {
-    double f, f_t, f_tt;
-  };
+  using Jet = std::array<double, 3>;  // f, f_t, f_tt
   // inputs: all parameters, then t
   Jet at(const std::vector<double>& inputs, Program::Scratch& scratch) const {
     if (!programs) return {constant, 0, 0};

@@ -83,19 +83,19 @@ void ConstraintTerms::phi(const Frames& frames, const RowLaws& laws, const Eigen
              p.phi(a, b, value);
              put_on_branch<P>(c, laws, angles, value);
            });
-  laws.subtract_f(out);
+  laws.subtract(0, out);
 }
 void ConstraintTerms::phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
   for_each(*data_, frames, out, [](const Constraint&, const auto& p, const Frame& a, const Frame& b, auto& value) {
     p.phi_dot(a, b, value);
   });
-  laws.subtract_f_t(out);
+  laws.subtract(1, out);
 }
 void ConstraintTerms::phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
   for_each(*data_, frames, out, [](const Constraint&, const auto& p, const Frame& a, const Frame& b, auto& value) {
     p.phi_ddot(a, b, value);
   });
-  laws.subtract_f_tt(out);
+  laws.subtract(2, out);
 }
 
 void ConstraintTerms::add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,

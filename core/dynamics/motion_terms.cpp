@@ -113,7 +113,7 @@ void MotionTerms::add_stabilisation(Eigen::VectorXd& gamma) {
 }
 
 void MotionTerms::complete_gamma(Eigen::VectorXd& phi_ddot) {
-  laws_.subtract_f_tt(phi_ddot);
+  laws_.subtract(2, phi_ddot);
   add_stabilisation(phi_ddot);
 }
 

@@ -206,17 +206,17 @@ void PlanarConstraints::phi(const Frames& frames, const RowLaws& laws, const Eig
                             Eigen::VectorXd& out) const {
   evaluate<Order::phi>(
       frames, [&](const PlanarConstraint& c, double x) { return on_branch(c, laws, angles, x); }, out);
-  laws.subtract_f(out);
+  laws.subtract(0, out);
 }
 void PlanarConstraints::phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
   evaluate<Order::phi_dot>(
       frames, [](const PlanarConstraint&, double x) { return x; }, out);
-  laws.subtract_f_t(out);
+  laws.subtract(1, out);
 }
 void PlanarConstraints::phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
   evaluate<Order::phi_ddot>(
       frames, [](const PlanarConstraint&, double x) { return x; }, out);
-  laws.subtract_f_tt(out);
+  laws.subtract(2, out);
 }
 
 void PlanarConstraints::add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,

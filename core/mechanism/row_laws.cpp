@@ -6,13 +6,13 @@ namespace mbsopt {
 
 RowLaws::RowLaws(const MechanismData& data) : data_(&data), jets_(data.laws.size()) {
   if (data.laws.empty()) return;
-  law_of_row_.assign(static_cast<std::size_t>(data.m), -1);
+  law_of_row_.assign(at(data.m), -1);
   inputs_.assign(data.rho.begin(), data.rho.end());
   inputs_.push_back(0);
   gradient_.resize(inputs_.size());
   for (std::size_t k = 0; k < data.laws.size(); ++k) {
     row_of_law_.push_back(data.laws[k].row);
-    law_of_row_[static_cast<std::size_t>(data.laws[k].row)] = static_cast<int>(k);
+    law_of_row_[at(data.laws[k].row)] = static_cast<int>(k);
     if (!data.laws[k].law.programs) continue;
     for (const Program& p : *data.laws[k].law.programs) p.grow(scratch_);
   }
@@ -21,8 +21,8 @@ RowLaws::RowLaws(const MechanismData& data) : data_(&data), jets_(data.laws.size
 RowLaws::RowLaws(const MechanismData& data, const std::vector<int>& rows) : RowLaws(data) {
   std::vector<int> laws(law_of_row_.empty() ? 0 : rows.size(), -1);
   for (std::size_t k = 0; k < laws.size(); ++k) {
-    laws[k] = law_of_row_[static_cast<std::size_t>(rows[k])];
-    if (laws[k] >= 0) row_of_law_[static_cast<std::size_t>(laws[k])] = static_cast<int>(k);
+    laws[k] = law_of_row_[at(rows[k])];
+    if (laws[k] >= 0) row_of_law_[at(laws[k])] = static_cast<int>(k);
   }
   law_of_row_ = std::move(laws);
 }
@@ -32,18 +32,8 @@ void RowLaws::set_time(double t) {
   inputs_.back() = t;
   for (std::size_t k = 0; k < jets_.size(); ++k) {
     jets_[k] = data_->laws[k].law.at(inputs_, scratch_);
-    if (held_) jets_[k].f_t = jets_[k].f_tt = 0;
+    if (held_) jets_[k][1] = jets_[k][2] = 0;
   }
-}
-
-void RowLaws::subtract_f(Eigen::VectorXd& phi) const {
-  for (std::size_t k = 0; k < jets_.size(); ++k) phi(row_of_law_[k]) -= jets_[k].f;
-}
-void RowLaws::subtract_f_t(Eigen::VectorXd& phi_dot) const {
-  for (std::size_t k = 0; k < jets_.size(); ++k) phi_dot(row_of_law_[k]) -= jets_[k].f_t;
-}
-void RowLaws::subtract_f_tt(Eigen::VectorXd& phi_ddot) const {
-  for (std::size_t k = 0; k < jets_.size(); ++k) phi_ddot(row_of_law_[k]) -= jets_[k].f_tt;
 }
 
 void RowLaws::add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* mu1, const Eigen::VectorXd* mu2,
@@ -60,23 +50,22 @@ void RowLaws::add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* m
       const Program& program = (*law.programs)[order];
       program.add_gradient(inputs_, -scale * (*mu[order])(row), gradient_, scratch_);
       for (const int input : program.used_inputs()) {
-        if (input < rho_bar.size()) rho_bar(input) += gradient_[static_cast<std::size_t>(input)];
+        if (input < rho_bar.size()) rho_bar(input) += gradient_[at(input)];
       }
     }
   }
 }
 
-void RowLaws::add_gradient(Derivative what, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+void RowLaws::add_gradient(std::size_t order, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
   if (!has_law(row)) return;
   const TimeLaw& law = data_->laws[index_of(row)].law;
-  if (what == Derivative::f)
-    FieldGradient{data_->theta_rho, data_->active, weight, rho_bar}.add<1>(law.slot, Vec<1>(1));
+  if (order == 0) FieldGradient{data_->theta_rho, data_->active, weight, rho_bar}.add<1>(law.slot, Vec<1>(1));
   if (!law.programs) return;
-  const Program& program = (*law.programs)[what == Derivative::f ? 0 : 1];
+  const Program& program = (*law.programs)[order];
   Program::Scratch scratch = program.scratch();
   std::vector<double> gradient(inputs_.size(), 0.0);
   program.add_gradient(inputs_, weight, gradient, scratch);
-  for (const int k : data_->active) rho_bar(k) += gradient[static_cast<std::size_t>(k)];
+  for (const int k : data_->active) rho_bar(k) += gradient[at(k)];
 }
 
 void RowLaws::subtract_tangents(const ParameterBlock& block, std::initializer_list<LaneRows*> out) {
@@ -93,7 +82,7 @@ void RowLaws::subtract_tangents(const ParameterBlock& block, std::initializer_li
       const Program& program = (*law.programs)[order];
       program.add_gradient(inputs_, 1, gradient_, scratch_);
       for (const int input : program.used_inputs()) {
-        if (input < P) rows[order]->row(row) -= gradient_[static_cast<std::size_t>(input)] * block.direction(input);
+        if (input < P) rows[order]->row(row) -= gradient_[at(input)] * block.direction(input);
       }
     }
   }

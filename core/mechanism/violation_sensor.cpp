@@ -87,7 +87,7 @@ struct ViolationFunction final : SensorFunction {
     }
     if (worst.row < 0) return;
     const RowLaws laws = laws_at(d, at.t);
-    laws.add_gradient(RowLaws::Derivative::f, worst.row, -to.scale, to.rho_bar);
+    laws.add_gradient(0, worst.row, -to.scale, to.rho_bar);
     for (const Constraint& c : d.constraints) {
       if (worst.row < c.row || worst.row >= c.row + c.rows()) continue;
       const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);

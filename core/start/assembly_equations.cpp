@@ -251,10 +251,8 @@ std::vector<SparseEntry> AssemblyEquations::entries(const VectorXd& y, MatrixXd*
     if (rho) FieldGradient{data_.theta_rho, data_.active, 1, rho_bars.col(row)}.add(slot, bar);
   };
   for_joint_gradients(level_, BodiesAt(y), 0, add, add_field);
-  for (const RowLaw& law : data_.laws) {
-    const RowLaws::Derivative what = positions() ? RowLaws::Derivative::f : RowLaws::Derivative::f_t;
-    if (rho) laws_.add_gradient(what, law.row, -1, rho_bars.col(law.row));
-  }
+  for (const RowLaw& law : data_.laws)
+    if (rho) laws_.add_gradient(positions() ? 0 : 1, law.row, -1, rho_bars.col(law.row));
   Index row = data_.m;
   for (int i = 1; i <= data_.n; ++i, ++row) {
     const Index p = layout.p(i), pdot = layout.pdot(i);

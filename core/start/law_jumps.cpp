@@ -30,22 +30,21 @@ TimeLaw::Jet LawJumps::at(const TimeLaw& law, double t) {
   return law.at(inputs_, scratch_);
 }
 
-LawJumps::Jump LawJumps::find(const TimeLaw& law, Derivative what, double t0, double t1) {
+LawJumps::Jump LawJumps::find(const TimeLaw& law, std::size_t order, double t0, double t1) {
   TimeLaw::Jet a = at(law, t0), b = at(law, t1);
-  const auto value = [&](const TimeLaw::Jet& x) { return what == Derivative::f ? x.f : x.f_t; };
-  const auto rate = [&](const TimeLaw::Jet& x) { return what == Derivative::f ? x.f_t : x.f_tt; };
   const auto difference = [&](const TimeLaw::Jet& from, const TimeLaw::Jet& to, double h) {
-    return value(to) - value(from) - h / 2 * (rate(from) + rate(to));
+    return to[order] - from[order] - h / 2 * (from[order + 1] + to[order + 1]);
   };
   // A difference is compared with the size of the law and of its change at its rate; a smaller one is rounding.
-  double size = std::max({std::abs(value(a)), std::abs(value(b)), (t1 - t0) * (std::abs(rate(a)) + std::abs(rate(b)))});
-  if (what == Derivative::f_t) size = std::max(size, std::max(std::abs(a.f), std::abs(b.f)) / (t1 - t0));
+  double size =
+      std::max({std::abs(a[order]), std::abs(b[order]), (t1 - t0) * (std::abs(a[order + 1]) + std::abs(b[order + 1]))});
+  if (order == 1) size = std::max(size, std::max(std::abs(a[0]), std::abs(b[0])) / (t1 - t0));
   const double shortest = 1e-14 * std::max(std::abs(t0), std::abs(t1));
   double wide = 0;  // the change over the last interval that is not yet so short
   while (true) {
     const double left = difference(a, b, t1 - t0);
     if (!std::isfinite(left) || std::abs(left) <= std::max(kJump * size, kRoundingOfLaw)) return {};
-    const double middle = t0 + kPart * (t1 - t0), change = value(b) - value(a);
+    const double middle = t0 + kPart * (t1 - t0), change = b[order] - a[order];
     if (t1 - t0 <= shortest || middle <= t0 || middle >= t1)
       return std::abs(change) > kSteep * wide ? Jump{t1, change} : Jump{};
     if (t1 - t0 > kWide * shortest) wide = std::abs(change);
@@ -63,12 +62,12 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Derivative what, double t0, do
 std::string LawJumps::between(double t0, double t1) {
   for (const RowLaw* law : laws_) {
     const std::string drive = law->drive >= 0 ? data_.drive_names[mbsopt::at(law->drive)] : "?";
-    if (const Jump f = find(law->law, Derivative::f, t0, t1); f.size != 0)
+    if (const Jump f = find(law->law, 0, t0, t1); f.size != 0)
       return fmt::format(
           "the law of drive '{}' jumps by {:.3g} at t = {:.6g} s, which no motion follows. Let it pass smoothly, over "
           "a short time, from one value to the other",
           drive, f.size, f.t);
-    if (const Jump f_t = find(law->law, Derivative::f_t, t0, t1); f_t.size != 0)
+    if (const Jump f_t = find(law->law, 1, t0, t1); f_t.size != 0)
       return fmt::format(
           "the law of drive '{}' changes its rate by {:.3g} 1/s at once at t = {:.6g} s: an impact, whose force has no "
           "bounds. Let the rate change over a short time",

@@ -20,12 +20,11 @@ class LawJumps {
   std::string between(double t0, double t1);
 
  private:
-  enum class Derivative { f, f_t };
   struct Jump {
     double t = 0, size = 0;
   };
   TimeLaw::Jet at(const TimeLaw& law, double t);
-  Jump find(const TimeLaw& law, Derivative what, double t0, double t1);
+  Jump find(const TimeLaw& law, std::size_t order, double t0, double t1);  // of f or of f_t
 
   const MechanismData& data_;
   std::vector<const RowLaw*> laws_;  // expressions only: constants and splines are smooth
