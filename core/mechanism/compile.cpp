@@ -13,12 +13,12 @@ namespace mbsopt {
 namespace {
 
 void group_rows(MechanismData& data) {
-  std::vector<int> terms(static_cast<std::size_t>(data.m), 0);
-  for (const Constraint& c : data.constraints) ++terms[static_cast<std::size_t>(c.row)];
+  std::vector<int> terms(at(data.m), 0);
+  for (const Constraint& c : data.constraints) ++terms[at(c.row)];
   for (Constraint& c : data.constraints) {
     c.block = data.blocks;
     data.blocks += c.rows();
-    const bool shared = terms[static_cast<std::size_t>(c.row)] > 1;
+    const bool shared = terms[at(c.row)] > 1;
     const RowGroup* last = data.groups.empty() ? nullptr : &data.groups.back();
     if (!last || shared || last->shared || last->body1 != c.body1 || last->body2 != c.body2) {
       data.groups.push_back({c.body1, c.body2, c.row, c.block, 0, shared});
@@ -27,52 +27,49 @@ void group_rows(MechanismData& data) {
   }
 }
 
+// The masses of bodies, or their inertias, as the rows of two of them see it. A body without mass transmits the forces
+// of a row to the bodies that it carries. The row then sees the other body, or else the lightest of all.
+class SeenInertia {
+ public:
+  explicit SeenInertia(const std::vector<double>& of_bodies) : of_bodies_(of_bodies) {
+    constexpr double kLeast = 1e-6;  // of the largest: keeps S = M + alpha J'J well scaled
+    const double most = std::ranges::max(of_bodies), largest = most > 0 ? most : 1;
+    least_ = kLeast * largest;
+    lightest_ = largest;
+    for (const double here : of_bodies)
+      if (here > 0) lightest_ = std::min(lightest_, here);
+    lightest_ = std::max(lightest_, least_);
+  }
+  double inverse(const Constraint& c) const {
+    double sum = 0;
+    for (const int body : {c.body1, c.body2})
+      if (of_bodies_[at(body)] > 0) sum += 1 / std::max(of_bodies_[at(body)], least_);
+    return sum > 0 ? sum : 1 / lightest_;
+  }
+
+ private:
+  std::vector<double> of_bodies_;
+  double least_, lightest_;
+};
+
 // The inertia that a row sees, independent of the configuration. For a point or distance it is the reduced mass of the
 // two bodies. For a direction or angle it is the reduced inertia about the body's farthest joint point. For an Euler
 // parameter it is four times that (p' = 1/2 G'omega). The inverses of several terms add up with their factors squared.
-// A body without mass transmits the forces of a row to the bodies that it carries. The row then sees the other body, or
-// else the lightest of all.
 void scale_alpha(MechanismData& data) {
-  const std::size_t bodies = data.bodies.size();
-  std::vector<double> mass(bodies), inertia(bodies), reach2(bodies, 0.0);
-  double largest_mass = 0, largest_inertia = 0;
-  for (const Constraint& c : data.constraints) {
-    c.for_each_point([&](int body, const Vector3d& s) {
-      double& r2 = reach2[static_cast<std::size_t>(body)];
-      r2 = std::max(r2, s.squaredNorm());
-    });
-  }
-  for (std::size_t i = 1; i < bodies; ++i) {
+  std::vector<double> masses, inertias, reach2(data.bodies.size(), 0.0);
+  for (const Constraint& c : data.constraints)
+    c.for_each_point(
+        [&](int body, const Vector3d& s) { reach2[at(body)] = std::max(reach2[at(body)], s.squaredNorm()); });
+  for (std::size_t i = 0; i < data.bodies.size(); ++i) {
     const BodyData& b = data.bodies[i];
-    mass[i] = b.mass;
-    inertia[i] = symmetric_eigenvalues(b.J)(2) + b.mass * reach2[i];
-    largest_mass = std::max(largest_mass, mass[i]);
-    largest_inertia = std::max(largest_inertia, inertia[i]);
+    masses.push_back(b.mass);
+    inertias.push_back(i == 0 ? 0 : symmetric_eigenvalues(b.J)(2) + b.mass * reach2[i]);
   }
-  if (largest_mass == 0) largest_mass = 1;
-  if (largest_inertia == 0) largest_inertia = 1;
-  static constexpr double kLeast = 1e-6;  // of the largest: keeps S = M + alpha J'J well scaled
-  const auto lightest = [](const std::vector<double>& x, double largest) {
-    double least = largest;
-    for (const double here : x) {
-      if (here > 0) least = std::min(least, here);
-    }
-    return std::max(least, kLeast * largest);
-  };
-  const double lightest_mass = lightest(mass, largest_mass), lightest_inertia = lightest(inertia, largest_inertia);
-  const auto inverse = [](const std::vector<double>& x, double largest, double otherwise, const Constraint& c) {
-    double sum = 0;
-    for (const int body : {c.body1, c.body2}) {
-      const double here = x[static_cast<std::size_t>(body)];
-      if (here > 0) sum += 1 / std::max(here, kLeast * largest);
-    }
-    return sum > 0 ? sum : 1 / otherwise;
-  };
+  const SeenInertia mass(masses), inertia(inertias);
   data.row_alpha.setZero(data.m);
   for (const Constraint& c : data.constraints) {
     const RowQuantity quantity = c.quantity();
-    const double seen = quantity == RowQuantity::length ? inverse(mass, largest_mass, lightest_mass, c)
-                                                        : inverse(inertia, largest_inertia, lightest_inertia, c);
+    const double seen = (quantity == RowQuantity::length ? mass : inertia).inverse(c);
     data.row_alpha.segment(c.row, c.rows()).array() +=
         c.factor * c.factor * seen * (quantity == RowQuantity::euler_parameter ? 0.25 : 1.0);
   }
