@@ -108,14 +108,9 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
   group_rows(model.data);
   scale_alpha(model.data);
   model.data.theta_rho = model.fields.theta_rho();
-  const auto find_plane = [&] {
-    PlanarSearch plane = find_planar_model(scene, model.data);
-    model.data.planar = std::move(plane.model);
-    model.data.not_planar = std::move(plane.reason);
-  };
-  find_plane();
+  find_planar_model(scene, model.data);
   close_rounded_loops(model.data, scene.simulation.redundancy_tolerance, model.fields.programs().independent_loops);
-  if (model.data.rounded.made) find_plane();
+  if (model.data.rounded.made) find_planar_model(scene, model.data);
   return std::move(model.data);
 }
 

@@ -1,59 +1,57 @@
 #include "core/mechanism/joint_graph.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <set>
-#include <vector>
 
 #include "core/constraint/constraint.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
+namespace {
 
-int joints_to_farthest_body(const MechanismData& data) {
-  const std::size_t bodies = data.bodies.size();
-  std::vector<std::vector<std::size_t>> neighbours(bodies);
-  for (const RowGroup& g : data.groups) {
-    const std::size_t a = static_cast<std::size_t>(g.body1), b = static_cast<std::size_t>(g.body2);
-    neighbours[a].push_back(b), neighbours[b].push_back(a);
-  }
-  constexpr int kUnknown = -1;
-  std::vector<int> distance(bodies, kUnknown);
-  for (std::size_t first = 0; first < bodies; ++first) {  // the ground is the first
-    if (distance[first] != kUnknown) continue;
-    distance[first] = 0;
-    for (std::vector<std::size_t> reached{first}; !reached.empty();) {
-      std::vector<std::size_t> next;
-      for (const std::size_t body : reached) {
-        for (const std::size_t neighbour : neighbours[body]) {
-          if (distance[neighbour] != kUnknown) continue;
-          distance[neighbour] = distance[body] + 1;
-          next.push_back(neighbour);
-        }
-      }
-      reached = std::move(next);
+constexpr int kUnknown = -1;
+
+// The number of joints from each body to the ground or, if none leads there, to the first body of its group.
+struct Paths {
+  std::vector<int> lengths;
+  std::size_t groups = 0;
+
+  explicit Paths(const MechanismData& data) {
+    Neighbours neighbours(data.bodies.size());
+    for (const RowGroup& g : data.groups) join(g.body1, g.body2, neighbours);
+    lengths.assign(neighbours.size(), kUnknown);
+    for (std::size_t first = 0; first < lengths.size(); ++first) {  // the ground is the first
+      if (lengths[first] != kUnknown) continue;
+      measure_paths(neighbours, first, lengths);
+      ++groups;
     }
   }
-  return *std::max_element(distance.begin(), distance.end());
+};
+
+}  // namespace
+
+std::vector<std::size_t> measure_paths(const Neighbours& neighbours, std::size_t first, std::vector<int>& lengths) {
+  lengths[first] = 0;
+  std::vector<std::size_t> reached{first};
+  for (std::size_t k = 0; k < reached.size(); ++k) {
+    for (const std::size_t next : neighbours[reached[k]]) {
+      if (lengths[next] != kUnknown) continue;
+      lengths[next] = lengths[reached[k]] + 1;
+      reached.push_back(next);
+    }
+  }
+  return reached;
 }
 
+int joints_to_farthest_body(const MechanismData& data) { return std::ranges::max(Paths(data).lengths); }
+
 bool closes_loops(const MechanismData& data) {
-  std::vector<int> group(data.bodies.size());  // connected bodies, named by one of them
-  std::iota(group.begin(), group.end(), 0);
-  const auto leader = [&](int body) {
-    const auto next = [&](int i) -> int& { return group[static_cast<std::size_t>(i)]; };
-    while (next(body) != body) body = next(body) = next(next(body));  // halves the path
-    return body;
-  };
   std::set<int> joints;
   for (const Constraint& c : data.constraints) {
     if (c.drive >= 0) return true;
-    if (!joints.insert(c.joint).second) continue;
-    const int a = leader(c.body1), b = leader(c.body2);
-    if (a == b) return true;
-    group[static_cast<std::size_t>(b)] = a;
+    joints.insert(c.joint);
   }
-  return false;
+  return joints.size() + Paths(data).groups > data.bodies.size();  // more joints than a tree has
 }
 
 }  // namespace mbsopt

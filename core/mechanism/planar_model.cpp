@@ -8,6 +8,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/constraint/constraint.hpp"
+#include "core/mechanism/joint_graph.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/scene.hpp"
 
@@ -81,22 +82,19 @@ class PlanarCompilation {
     }
   }
 
+  // Returns whether a parameter changes a vector along an axis.
+  bool moves(const Vector3d& axis, int slot) const {
+    if (slot < 0) return false;
+    const auto change = data_.theta_rho.middleRows<3>(slot);
+    return (axis.transpose() * change).cwiseAbs().maxCoeff() > kParallel * change.cwiseAbs().maxCoeff();
+  }
   Lies lies(int body, const Vector3d& s, int slot) const {
     const PlanarBody& b = model_.bodies[at(body)];
-    const double along = b.n.dot(s), size = s.norm();
-    double turns_in = 0, turns_out = 0;  // by parameters
-    if (slot >= 0) {
-      const auto change = data_.theta_rho.middleRows<3>(slot);
-      const double rounding = kParallel * change.cwiseAbs().maxCoeff();
-      turns_in = std::max((b.b1.transpose() * change).cwiseAbs().maxCoeff(),
-                          (b.b2.transpose() * change).cwiseAbs().maxCoeff());
-      turns_out = (b.n.transpose() * change).cwiseAbs().maxCoeff();
-      if (turns_in <= rounding) turns_in = 0;
-      if (turns_out <= rounding) turns_out = 0;
-    }
-    if (std::abs(along) <= kParallel * size && turns_out == 0) return Lies::in_plane;
+    const double size = s.norm();
+    if (std::abs(b.n.dot(s)) <= kParallel * size && !moves(b.n, slot)) return Lies::in_plane;
     const Plane rest = b.in_plane(s);
-    if (std::hypot(rest.re, rest.im) <= kParallel * size && turns_in == 0) return Lies::along_normal;
+    if (std::hypot(rest.re, rest.im) <= kParallel * size && !moves(b.b1, slot) && !moves(b.b2, slot))
+      return Lies::along_normal;
     return Lies::across;
   }
 
@@ -198,41 +196,25 @@ class PlanarCompilation {
       const Vector3d &s1 = point ? point->s1 : plane->s1, &s2 = point ? point->s2 : plane->s2;
       const Vector3d &n1 = model_.bodies[at(c.body1)].n, &n2 = model_.bodies[at(c.body2)].n;
       if (std::abs(n1.dot(s1) - n2.dot(s2)) > kParallel * (s1.norm() + s2.norm())) return true;
-      if (rises(n1, c.slot1) || rises(n2, c.slot2)) return true;
+      if (moves(n1, c.slot1) || moves(n2, c.slot2)) return true;
     }
     return false;
-  }
-  bool rises(const Vector3d& n, int slot) const {  // whether a parameter changes the height
-    if (slot < 0) return false;
-    const auto change = data_.theta_rho.middleRows<3>(slot);
-    return (n.transpose() * change).cwiseAbs().maxCoeff() > kParallel * change.cwiseAbs().maxCoeff();
   }
 
   // Follows joints from the ground; a joint that holds() keeps one of its bodies in the plane if the other one is.
   // Returns a message on a body that no joint holds, or an empty string.
   std::string body_not_held() const {
-    std::vector<std::vector<int>> neighbours(data_.bodies.size());
+    Neighbours neighbours(data_.bodies.size());
     int seen = -1;  // the joint whose first dot-1, which has axis 2, was tested
     for (const Constraint& c : data_.constraints) {
       if (c.joint < 0 || c.joint == seen || !std::holds_alternative<Dot1>(c.primitive)) continue;
       seen = c.joint;
-      if (!holds(c)) continue;
-      neighbours[at(c.body1)].push_back(c.body2);
-      neighbours[at(c.body2)].push_back(c.body1);
+      if (holds(c)) join(c.body1, c.body2, neighbours);
     }
-    std::vector<bool> held(data_.bodies.size(), false);
-    std::vector<int> reached{0};
-    held[0] = true;
-    while (!reached.empty()) {
-      const int body = reached.back();
-      reached.pop_back();
-      for (const int next : neighbours[at(body)]) {
-        if (!held[at(next)]) reached.push_back(next);
-        held[at(next)] = true;
-      }
-    }
+    std::vector<int> joints(data_.bodies.size(), -1);
+    measure_paths(neighbours, 0, joints);
     for (int i = 1; i <= data_.n; ++i) {
-      if (!held[at(i)]) {
+      if (joints[at(i)] < 0) {
         return fmt::format("no joint holds body '{}' in the plane (revolute, planar, translational or fixed joints do)",
                            data_.body_names[at(i)]);
       }
@@ -258,20 +240,21 @@ class PlanarCompilation {
 
 }  // namespace
 
-PlanarSearch find_planar_model(const Scene& scene, const MechanismData& data) {
-  std::string reason;
+void find_planar_model(const Scene& scene, MechanismData& data) {
+  data.planar = nullptr;
   int most = -1;
   for (const int normal : {2, 0, 1}) {
     PlanarCompilation search(scene, data, normal);
     std::string why = search.run();
-    if (why.empty()) return {std::make_shared<const PlanarModel>(search.take()), ""};
-    const int axes = search.axes_along_normal();
-    if (axes > most) {
-      most = axes;
-      reason = std::move(why);
+    if (why.empty()) {
+      data.planar = std::make_shared<const PlanarModel>(search.take());
+      data.not_planar.clear();
+      return;
     }
+    const int axes = search.axes_along_normal();
+    if (axes > most) data.not_planar = std::move(why);
+    most = std::max(most, axes);
   }
-  return {nullptr, reason};
 }
 
 }  // namespace mbsopt

@@ -69,12 +69,8 @@ struct PlanarModel {
   }
 };
 
-// The planar model of compiled data whose theta_rho is set. If there is none, it holds the reason in words that end the
-// sentence "is not planar: ...".
-struct PlanarSearch {
-  std::shared_ptr<const PlanarModel> model;
-  std::string reason;
-};
-PlanarSearch find_planar_model(const Scene& scene, const MechanismData& data);
+// Sets the planar model of compiled data whose theta_rho is set. If there is none, sets data.not_planar to the reason,
+// in words that end the sentence "is not planar: ...".
+void find_planar_model(const Scene& scene, MechanismData& data);
 
 }  // namespace mbsopt

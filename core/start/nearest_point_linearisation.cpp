@@ -1,11 +1,11 @@
 #include "core/start/nearest_point_linearisation.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <limits>
-#include <numeric>
 #include <utility>
 #include <vector>
+
+#include "core/mechanism/joint_graph.hpp"
 
 namespace mbsopt {
 
@@ -67,29 +67,24 @@ MatrixXd null_space_by_parts(const MatrixXd& J, const OrthogonalDecomposition& J
 
 }  // namespace
 
-std::vector<JoinedPart> joined_parts(const MatrixXd& J) {
-  std::vector<std::size_t> joined(static_cast<std::size_t>(J.cols()));
-  std::iota(joined.begin(), joined.end(), std::size_t{0});
-  const auto root = [&](std::size_t k) {
-    while (joined[k] != k) k = joined[k] = joined[joined[k]];
-    return k;
-  };
-  std::vector<std::size_t> of_row(static_cast<std::size_t>(J.rows()), joined.size());  // size(): no entry
-  for (Eigen::Index i = 0; i < J.rows(); ++i) {
-    std::size_t& first = of_row[static_cast<std::size_t>(i)];
-    for (Eigen::Index k = 0; k < J.cols(); ++k) {
-      if (J(i, k) == 0) continue;
-      const std::size_t other = root(static_cast<std::size_t>(k));
-      first = first == joined.size() ? other : joined[other] = root(first);
+std::vector<JoinedPart> joined_parts(const MatrixXd& A) {
+  const int unknowns = static_cast<int>(A.cols()), rows = static_cast<int>(A.rows());
+  Neighbours neighbours(at(unknowns + rows));
+  for (int i = 0; i < rows; ++i)
+    for (int k = 0; k < unknowns; ++k)
+      if (A(i, k) != 0) join(k, unknowns + i, neighbours);
+  std::vector<int> lengths(neighbours.size(), -1);
+  std::vector<JoinedPart> parts;
+  for (std::size_t first = 0; first < at(unknowns); ++first) {
+    if (lengths[first] >= 0) continue;
+    JoinedPart& part = parts.emplace_back();
+    std::vector<std::size_t> reached = measure_paths(neighbours, first, lengths);
+    std::ranges::sort(reached);
+    for (const std::size_t k : reached) {
+      const Eigen::Index place = static_cast<Eigen::Index>(k);
+      k < at(unknowns) ? part.unknowns.push_back(place) : part.rows.push_back(place - unknowns);
     }
   }
-  std::vector<JoinedPart> of_root(joined.size()), parts;
-  for (std::size_t k = 0; k < joined.size(); ++k) of_root[root(k)].unknowns.push_back(static_cast<Eigen::Index>(k));
-  for (std::size_t i = 0; i < of_row.size(); ++i) {
-    if (of_row[i] < joined.size()) of_root[root(of_row[i])].rows.push_back(static_cast<Eigen::Index>(i));
-  }
-  std::ranges::copy_if(of_root, std::back_inserter(parts),
-                       [](const JoinedPart& part) { return !part.unknowns.empty(); });
   return parts;
 }
 
