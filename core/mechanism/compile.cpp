@@ -1,5 +1,3 @@
-#include "core/mechanism/compile.hpp"
-
 #include <algorithm>
 
 #include "core/constraint/constraint.hpp"

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/body/state_layout.hpp"
-#include "core/mechanism/compile.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/state_point.hpp"

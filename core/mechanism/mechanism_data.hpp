@@ -70,9 +70,11 @@ struct RoundedLoops {
   bool made = false;           // part is within simulation.redundancy_tolerance
 };
 
-struct Constraint;   // core/constraint/constraint.hpp
-struct Forces;       // core/force/forces.hpp
-struct PlanarModel;  // planar_model.hpp
+class ScenePrograms;  // scene_programs.hpp
+struct Scene;         // core/scene/scene.hpp
+struct Constraint;    // core/constraint/constraint.hpp
+struct Forces;        // core/force/forces.hpp
+struct PlanarModel;   // planar_model.hpp
 
 // Headers of the kinds of constraints and forces stay out, so that a change to one recompiles only what computes with
 // it.
@@ -125,6 +127,11 @@ struct MechanismData {
     }
   }
 };
+
+// Compiles a scene. Throws SceneError with the place in the scene. `programs` are those of this scene, or null.
+MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
+                      std::vector<std::shared_ptr<const UserForce>> user_forces,
+                      std::shared_ptr<ScenePrograms> programs = nullptr);
 
 struct Energy {
   double kinetic = 0, potential = 0;

@@ -20,7 +20,6 @@
 #include "core/mechanism/sensor_gradient.hpp"
 #include "core/projection/projection.hpp"
 #include "core/start/assembly_equations.hpp"
-#include "core/start/assembly_report.hpp"
 #include "core/start/equilibrium.hpp"
 #include "core/start/nearest_point.hpp"
 

@@ -8,6 +8,7 @@
 // of (F_q'nu)_rho. These are exact, without differences.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "core/linear/sparse_projection.hpp"
@@ -97,5 +98,8 @@ class AssemblyEquations final : public NearestPointEquations {
   Eigen::VectorXd angles_, q_;
   RowLaws laws_;  // at t
 };
+
+// The message of a failed assembly: the joints and conditions that stay violated, by how much, and what to try.
+std::string assembly_failure(const MechanismData& data, const AssemblyEquations& equations, const NearestPoint& found);
 
 }  // namespace mbsopt

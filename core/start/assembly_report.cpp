@@ -1,5 +1,3 @@
-#include "core/start/assembly_report.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "core/constraint/constraint.hpp"
+#include "core/start/assembly_equations.hpp"
 
 namespace mbsopt {
 namespace {

@@ -8,7 +8,7 @@
 #include "core/body/frame.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
-#include "core/start/unit_rows.hpp"
+#include "core/start/nearest_point_linearisation.hpp"
 
 namespace mbsopt {
 

@@ -1,4 +1,4 @@
-#include "core/mechanism/compile.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/force/forces.hpp"
 
