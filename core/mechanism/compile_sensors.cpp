@@ -19,12 +19,11 @@ std::shared_ptr<SensorFunction> sensor(Compilation& model, const Sensor& s, cons
 void add_condition(Compilation& model, std::size_t i) {
   const Condition& c = model.scene.conditions[i];
   const std::string where = std::string("initial.") + child_path("conditions", i);
-  ConditionData out;
   const auto found = std::find(model.data.sensor_names.begin(), model.data.sensor_names.end(), c.sensor);
   if (found == model.data.sensor_names.end())
     throw SceneError(where + ".sensor: there is no sensor '" + c.sensor + "'");
-  out.sensor = static_cast<int>(found - model.data.sensor_names.begin());
-  const SensorPtr& sensor = model.data.sensors[static_cast<std::size_t>(out.sensor)];
+  const int index = static_cast<int>(found - model.data.sensor_names.begin());
+  const SensorPtr &sensor = model.data.sensors[at(index)], rate = sensor->rate(model.data);
   if (sensor->reads > Reads::velocities)
     throw SceneError(where + ": a condition on sensor '" + c.sensor +
                      "' is not possible; use positions, velocities, angles, distances, their rates, angular "
@@ -32,30 +31,20 @@ void add_condition(Compilation& model, std::size_t i) {
   if (c.acceleration)
     throw SceneError(
         where + ".acceleration: is for the command kinematics only; elsewhere accelerations follow from the forces");
-  out.rate_sensor = sensor->rate(model.data);
-  out.velocity_level = sensor->reads == Reads::velocities;
-  out.modulo_turn = sensor->angle() >= 0 && !out.velocity_level;
-  const Sensor& spec = model.scene.sensors[static_cast<std::size_t>(out.sensor)];
-  const Dimension of = shown_dimension(model.scene, spec).value_or(Dimension{});
-  if (!of.is_none()) {
-    out.unit = " " + to_string(of);
-    out.rate_unit = " " + to_string(of / dimension::kTime);
-  }
-  if (c.value) {
-    const FieldValue v = model.fields.value(*c.value, where + ".value");
-    out.has_value = true;
+  const bool of_velocities = sensor->reads == Reads::velocities;
+  const Dimension of = shown_dimension(model.scene, model.scene.sensors[at(index)]).value_or(Dimension{});
+  const auto add = [&](ConditionData out, const Field& field, const char* key) {
+    const FieldValue v = model.fields.value(field, where + key);
     out.value = v.value();
-    out.slot_value = model.fields.slot(v);
-  }
-  if (c.rate) {
-    if (out.velocity_level) throw SceneError(where + ".rate: sensor '" + c.sensor + "' is a velocity: give its value");
-    if (!out.rate_sensor) throw SceneError(where + ".rate: the rate of sensor '" + c.sensor + "' is not available");
-    const FieldValue v = model.fields.value(*c.rate, where + ".rate");
-    out.has_rate = true;
-    out.rate = v.value();
-    out.slot_rate = model.fields.slot(v);
-  }
-  model.data.conditions.push_back(out);
+    out.slot = model.fields.slot(v);
+    if (!of.is_none()) out.unit = " " + to_string(out.of_rate ? of / dimension::kTime : of);
+    model.data.conditions.push_back(std::move(out));
+  };
+  if (c.value) add({index, of_velocities, false, sensor, of_velocities ? sensor : rate}, *c.value, ".value");
+  if (!c.rate) return;
+  if (of_velocities) throw SceneError(where + ".rate: sensor '" + c.sensor + "' is a velocity: give its value");
+  if (!rate) throw SceneError(where + ".rate: the rate of sensor '" + c.sensor + "' is not available");
+  add({index, true, true, rate, rate}, *c.rate, ".rate");
 }
 
 }  // namespace

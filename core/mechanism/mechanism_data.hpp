@@ -40,13 +40,15 @@ struct RowLaw {
   int drive = -1;  // index in the scene of the drive that it belongs to
 };
 
+// A value that the initial state gives to a sensor, or to its rate.
 struct ConditionData {
   int sensor = 0;
-  SensorPtr rate_sensor;  // the sensor's time derivative, where it has one
-  bool has_value = false, has_rate = false, modulo_turn = false, velocity_level = false;
-  double value = 0, rate = 0;
-  int slot_value = -1, slot_rate = -1;
-  std::string unit, rate_unit;  // " rad", " rad/s"; empty for a number
+  bool of_velocities = false, of_rate = false;
+  SensorPtr measured;  // the sensor, or its rate
+  SensorPtr rate;      // the time derivative of `measured`; of velocities `measured` itself
+  double value = 0;
+  int slot = -1;
+  std::string unit{};  // " rad", " rad/s"; empty for a number
 };
 
 struct KinkedSignal {  // a derivative jumps at its samples, later by the delay

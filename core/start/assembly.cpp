@@ -197,15 +197,15 @@ struct Assembly::Solution {
     const VectorXd continued = position.followed_angles();
     position.start_branches(result.y);
     const auto is_turned = [&](const AssemblyTarget& target) {
-      return target.sensor->angle() < 0 && evaluate(data, target.sensor, start, result.y, continued) !=
-                                               evaluate(data, target.sensor, start, result.y, position.angles());
+      return target.sensor()->angle() < 0 && evaluate(data, target.sensor(), start, result.y, continued) !=
+                                                 evaluate(data, target.sensor(), start, result.y, position.angles());
     };
     if (std::ranges::any_of(position.targets(), is_turned)) position.set_angles(continued);
     result.angles = position.angles();
     for (const AssemblyTarget& target : position.targets()) {
-      if (target.sensor->angle() < 0) continue;
-      double& angle = result.angles(target.sensor->angle());
-      angle = Angle::on_branch(angle, target.value);
+      if (target.sensor()->angle() < 0) continue;
+      double& angle = result.angles(target.sensor()->angle());
+      angle = Angle::on_branch(angle, target.condition->value);
     }
     position.settle_shared_rows(result.y, result.angles);
   }

@@ -5,11 +5,11 @@
 #include <numbers>
 
 #include "core/body/state_layout.hpp"
-#include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/dynamics/constraint_terms.hpp"
-#include "core/mechanism/followed_angles.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/mechanism/sensor_gradient.hpp"
+#include "core/mechanism/followed_angles.hpp"
 
 namespace mbsopt {
 
@@ -39,20 +39,8 @@ AssemblyEquations::AssemblyEquations(const MechanismData& data, AssemblyLevel le
       angles_(Eigen::VectorXd::Zero(static_cast<Index>(data.angles.size()))),
       laws_(data) {
   laws_.set_time(t);
-  for (std::size_t i = 0; i < data.conditions.size(); ++i) {
-    const ConditionData& c = data.conditions[i];
-    const SensorPtr& sensor = data.sensors[at(c.sensor)];
-    const int index = static_cast<int>(i);
-    if (level == AssemblyLevel::position) {
-      if (c.has_value && !c.velocity_level) {
-        targets_.push_back({index, sensor, c.rate_sensor, c.value, c.slot_value, c.value});
-      }
-    } else if (c.velocity_level) {
-      if (c.has_value) targets_.push_back({index, sensor, sensor, c.value, c.slot_value, 0});
-    } else if (c.has_rate) {
-      targets_.push_back({index, c.rate_sensor, c.rate_sensor, c.rate, c.slot_rate, 0});
-    }
-  }
+  for (const ConditionData& c : data.conditions)
+    if (c.of_velocities != positions()) targets_.push_back({&c, c.value});
 }
 
 Index AssemblyEquations::rows() const { return data_.m + data_.n + static_cast<Index>(targets_.size()); }
@@ -67,12 +55,12 @@ VectorXd AssemblyEquations::followed_angles() const {
   VectorXd angles = angles_;
   if (level_ == AssemblyLevel::velocity) return angles;
   for (const AssemblyTarget& target : targets_)
-    if (target.sensor->angle() >= 0) angles(target.sensor->angle()) = target.branch;
+    if (target.sensor()->angle() >= 0) angles(target.sensor()->angle()) = target.branch;
   return angles;
 }
 
 VectorXd AssemblyEquations::branches(const AssemblyTarget& target) const {
-  if (target.sensor->angle() < 0) return followed_angles();
+  if (target.sensor()->angle() < 0) return followed_angles();
   return VectorXd::Constant(static_cast<Index>(data_.angles.size()), target.branch);
 }
 
@@ -171,7 +159,7 @@ void AssemblyEquations::accept(const VectorXd& x) {
   const VectorXd y = state(x);
   continue_angles(data_, y, angles_);
   for (AssemblyTarget& target : targets_)
-    if (target.sensor->angle() >= 0) target.branch = evaluate(data_, target.sensor, t_, y, branches(target));
+    if (target.sensor()->angle() >= 0) target.branch = evaluate(data_, target.sensor(), t_, y, branches(target));
 }
 
 VectorXd AssemblyEquations::values_at(const VectorXd& y) const {
@@ -188,7 +176,7 @@ VectorXd AssemblyEquations::values_at(const VectorXd& y) const {
     F(row++) = positions() ? UnitNorm::phi(b.p) : UnitNorm::phi_dot(b.p, b.pdot);
   }
   for (const AssemblyTarget& target : targets_)
-    F(row++) = evaluate(data_, target.sensor, t_, y, branches(target)) - target.value;
+    F(row++) = evaluate(data_, target.sensor(), t_, y, branches(target)) - target.condition->value;
   return F;
 }
 
@@ -265,9 +253,9 @@ std::vector<SparseEntry> AssemblyEquations::entries(const VectorXd& y, MatrixXd*
   for (const AssemblyTarget& target : targets_) {
     y_bar.setZero();
     rho_bar.setZero();
-    add_gradient(data_, target.sensor, t_, y, branches(target), 1, y_bar, rho_bar);
+    add_gradient(data_, target.sensor(), t_, y, branches(target), 1, y_bar, rho_bar);
     for (Index k = 0; k < y.size(); ++k) add(row, k, y_bar(k));
-    add_field(row, target.slot, Vec<1>(-1));
+    add_field(row, target.condition->slot, Vec<1>(-1));
     if (rho) rho_bars.col(row) += rho_bar;
     ++row;
   }
@@ -328,11 +316,11 @@ void AssemblyEquations::add_target_curvature(const AssemblyTarget& target, const
       out.rho.row(j) += rho_bar.transpose();
     }
   };
-  const std::vector<SensorPtr> components = target.rate->components();
-  if (components.empty()) return add_linear(target.rate, nu);
+  const std::vector<SensorPtr> components = target.condition->rate->components();
+  if (components.empty()) return add_linear(target.condition->rate, nu);
   // f = |c| with components c_i linear in v:  f_v = c'c_v/f,  d f_v = (dc' c_v + c' dc_v - f_v df)/f
   VectorXd f_y = VectorXd::Zero(y.size()), f_rho = VectorXd::Zero(P);
-  const double f = add_gradient(data_, target.sensor, t_, y, branch, 1, f_y, f_rho);
+  const double f = add_gradient(data_, target.sensor(), t_, y, branch, 1, f_y, f_rho);
   if (f == 0) return;
   for (const SensorPtr& component : components) {
     VectorXd c_y = VectorXd::Zero(y.size()), c_rho = VectorXd::Zero(P);

@@ -20,14 +20,12 @@ namespace mbsopt {
 
 enum class AssemblyLevel { position, velocity };
 
-// A sensor and the value that it must have.
+// A condition at the level of the equations.
 struct AssemblyTarget {
-  int condition = 0;  // index in MechanismData::conditions
-  SensorPtr sensor;
-  SensorPtr rate;  // its time derivative; at velocity level the sensor itself
-  double value = 0;
-  int slot = -1;
-  double branch = 0;  // of an angle: the last accepted value, from which it continues
+  const ConditionData* condition;
+  double branch;  // of an angle: the last accepted value, from which it continues
+
+  const SensorPtr& sensor() const { return condition->measured; }
 };
 
 // As a problem of the nearest point, the unknowns x are q, or v at a held q.

@@ -56,15 +56,14 @@ void add_drive(const MechanismData& d, bool rates, const Constraint& c, const Ei
       {name, amount, fmt::format("{}: missed by {:.3g}{}{}", name, amount, unit, rates ? " per second" : "")});
 }
 
-void add_condition(const MechanismData& d, bool rates, const AssemblyTarget& target, double off,
-                   std::vector<Finding>& findings) {
+void add_condition(const MechanismData& d, const AssemblyTarget& target, double off, std::vector<Finding>& findings) {
   // The norm of a velocity has no direction in which it could grow from rest.
-  const bool at_rest = !target.sensor->components().empty() && std::abs(target.value + off) < 1e-12;
-  const ConditionData& c = d.conditions[at(target.condition)];
-  const std::string &unit = rates && !c.velocity_level ? c.rate_unit : c.unit, &sensor = d.sensor_names[at(c.sensor)];
+  const ConditionData& c = *target.condition;
+  const bool at_rest = !c.measured->components().empty() && std::abs(c.value + off) < 1e-12;
+  const std::string& sensor = d.sensor_names[at(c.sensor)];
   findings.push_back({"the condition of '" + sensor + "'", std::abs(off),
                       fmt::format("condition on '{}': asks for {}{:.3g}{}, nearest possible {:.3g}{}{}", sensor,
-                                  c.has_rate && rates ? "rate " : "", target.value, unit, target.value + off, unit,
+                                  c.of_rate ? "rate " : "", c.value, c.unit, c.value + off, c.unit,
                                   at_rest ? " (from a guess at rest; give a velocity of the body)" : "")});
 }
 
@@ -81,7 +80,7 @@ std::string assembly_failure(const MechanismData& d, const AssemblyEquations& eq
   for (const Constraint& c : d.constraints)
     if (c.drive >= 0) add_drive(d, !positions, c, F, findings);
   Eigen::Index row = d.m + d.n;
-  for (const AssemblyTarget& target : equations.targets()) add_condition(d, !positions, target, F(row++), findings);
+  for (const AssemblyTarget& target : equations.targets()) add_condition(d, target, F(row++), findings);
   if (!std::isfinite(F.squaredNorm())) {
     std::vector<std::string> names;
     for (const Finding& f : findings)

@@ -1,6 +1,6 @@
-#include "core/mechanism/mechanism_data.hpp"
 #include "core/constraint/constraint.hpp"
 #include "core/force/forces.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -82,7 +82,7 @@ Numbers numbers_of(const MechanismData& d) {
     const auto* p = dynamic_cast<const PointSensor*>(s.get());
     if (p) x.add(p->a.slot, p->a.s), x.add(p->b.slot, p->b.s);
   }
-  for (const ConditionData& c : d.conditions) x.add(c.slot_value, Vec<1>(c.value)), x.add(c.slot_rate, Vec<1>(c.rate));
+  for (const ConditionData& c : d.conditions) x.add(c.slot, Vec<1>(c.value));
   return x;
 }
 
