@@ -40,7 +40,7 @@ std::size_t Compilation::joint_index(const std::string& name, const std::string&
 
 FieldVector3 Compilation::vector(int body, const PointField& field, const std::string& where) const {
   if (const auto* name = std::get_if<std::string>(&field)) {
-    if (*name == "O") return {fields.constant(0), fields.constant(0), fields.constant(0)};
+    if (*name == "O") return fields.constants(Vector3d::Zero());
     if (body > 0) {
       const auto& points = scene.bodies[static_cast<std::size_t>(body - 1)].points;
       if (const auto found = points.find(*name); found != points.end()) {

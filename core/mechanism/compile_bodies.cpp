@@ -3,16 +3,6 @@
 #include "core/mechanism/mechanism.hpp"
 
 namespace mbsopt {
-namespace {
-
-FieldVector3 unit_vector(const Compilation& model, std::size_t k) {
-  FieldVector3 e{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
-  e[k] = model.fields.constant(1);
-  return e;
-}
-
-}  // namespace
-
 FieldVector4 orientation_of(const Compilation& model, const OrientationField& field, const std::string& where) {
   if (const auto* e = std::get_if<EulerParametersField>(&field)) {
     const FieldVector4 p = model.fields.values(e->e, where);
@@ -24,9 +14,8 @@ FieldVector4 orientation_of(const Compilation& model, const OrientationField& fi
     return euler_parameters(model.unit_axis(axis, where + ".axis"), model.fields.value(a->angle, where + ".angle"));
   }
   const FieldVector3 rpy = model.fields.values(std::get<RollPitchYawField>(field).rpy, where + ".rpy");
-  FieldVector4 p = euler_parameters(unit_vector(model, 2), rpy[2]);
-  p = quaternion_product(p, euler_parameters(unit_vector(model, 1), rpy[1]));
-  return quaternion_product(p, euler_parameters(unit_vector(model, 0), rpy[0]));
+  const auto turn = [&](int k) { return euler_parameters(model.fields.constants(Vector3d::Unit(k)), rpy[at(k)]); };
+  return quaternion_product(quaternion_product(turn(2), turn(1)), turn(0));
 }
 
 namespace {
@@ -34,9 +23,9 @@ namespace {
 // J = tr(S) I - S with S = m U U': xx yy zz xy xz yz.
 FieldVector<6> tensor_of(const Compilation& model, const ConsistentInertiaField& I, const FieldValue& m,
                          const std::string& where) {
-  const FieldValue x = model.fields.value(I.x, where + ".x"), y = model.fields.value(I.y, where + ".y"),
-                   z = model.fields.value(I.z, where + ".z"), xy = model.fields.value(I.xy, where + ".xy"),
-                   xz = model.fields.value(I.xz, where + ".xz"), yz = model.fields.value(I.yz, where + ".yz");
+  const auto field = [&](const Field& value, const char* key) { return model.fields.value(value, where + key); };
+  const FieldValue x = field(I.x, ".x"), y = field(I.y, ".y"), z = field(I.z, ".z");
+  const FieldValue xy = field(I.xy, ".xy"), xz = field(I.xz, ".xz"), yz = field(I.yz, ".yz");
   const FieldValue Sxx = x * x + xy * xy + xz * xz, Syy = y * y + yz * yz, Szz = z * z;
   const FieldValue Sxy = xy * y + xz * yz, Sxz = xz * z, Syz = yz * z;
   return {m * (Syy + Szz), m * (Sxx + Szz), m * (Sxx + Syy), -m * Sxy, -m * Sxz, -m * Syz};
@@ -48,24 +37,29 @@ FieldVector<6> inertia(const Compilation& model, const Body& body, const FieldVa
   return model.fields.values(std::array<Field, 6>{I.xx, I.yy, I.zz, I.xy, I.xz, I.yz}, where);
 }
 
-void add_body(Compilation& model, const Body& body, BodyData& out, FieldVector3& com, FieldVector4& p, FieldVector3& r,
-              const std::string& where) {
-  const FieldValue mass = model.fields.value(body.mass, where + ".mass");
+void add_body(Compilation& model, const Body& body, const std::string& where) {
+  BodyData out;
+  const FieldValues& fields = model.fields;
+  const FieldValue mass = fields.value(body.mass, where + ".mass");
   if (mass.value() < 0) throw SceneError(where + ".mass: is negative, a mass must not be");
   out.mass = mass.value();
   out.slot_mass = model.fields.slot(mass);
   const Vec<6> x = numbers(model.keep(out.slot_J, inertia(model, body, mass, where + ".inertia")));
   out.J << x(0), x(3), x(4), x(3), x(1), x(5), x(4), x(5), x(2);
-  com = model.fields.values(body.com, where + ".com");
+  const FieldVector3 com = fields.values(body.com, where + ".com");
   out.com = numbers(model.keep(out.slot_com, com));
-
-  p = orientation_of(model, body.orientation, where + ".orientation");
-  r = model.fields.values(body.position, where + ".position") + rotated(p, com);
+  const FieldVector4 p = orientation_of(model, body.orientation, where + ".orientation");
+  const FieldVector3 r = fields.values(body.position, where + ".position") + rotated(p, com);
   const FieldVector<7> q{r[0], r[1], r[2], p[0], p[1], p[2], p[3]};
   out.q = numbers(model.keep(out.slot_q, q));
-  out.velocity = numbers(model.keep(out.slot_velocity, model.fields.values(body.velocity, where + ".velocity")));
-  out.angular_velocity = numbers(
-      model.keep(out.slot_angular_velocity, model.fields.values(body.angular_velocity, where + ".angular_velocity")));
+  out.velocity = numbers(model.keep(out.slot_velocity, fields.values(body.velocity, where + ".velocity")));
+  out.angular_velocity =
+      numbers(model.keep(out.slot_angular_velocity, fields.values(body.angular_velocity, where + ".angular_velocity")));
+  model.com.push_back(com);
+  model.orientation.push_back(p);
+  model.position.push_back(r);
+  model.data.bodies.push_back(out);
+  model.data.body_names.push_back(body.name);
 }
 
 }  // namespace
@@ -73,20 +67,14 @@ void add_body(Compilation& model, const Body& body, BodyData& out, FieldVector3&
 void compile_bodies(Compilation& model) {
   model.data.n = static_cast<int>(model.scene.bodies.size());
   if (model.data.n == 0) throw SceneError("bodies: a scene needs at least one body besides the ground");
-  model.data.bodies.resize(model.scene.bodies.size() + 1);
+  const FieldVector3 origin = model.fields.constants(Vector3d::Zero());
+  model.com = model.position = {origin};
+  model.orientation.push_back({model.fields.constant(1), origin[0], origin[1], origin[2]});
+  model.data.bodies.resize(1);
   model.data.bodies[0].q << 0, 0, 0, 1, 0, 0, 0;
   model.data.body_names = {"ground"};
-  model.com.resize(model.data.bodies.size());
-  for (FieldValue& c : model.com[0]) c = model.fields.constant(0);
-  model.orientation.resize(model.data.bodies.size());
-  model.position.resize(model.data.bodies.size());
-  for (FieldValue& c : model.position[0]) c = model.fields.constant(0);
-  for (std::size_t k = 0; k < 4; ++k) model.orientation[0][k] = model.fields.constant(k == 0 ? 1 : 0);
-  for (std::size_t i = 0; i < model.scene.bodies.size(); ++i) {
-    add_body(model, model.scene.bodies[i], model.data.bodies[i + 1], model.com[i + 1], model.orientation[i + 1],
-             model.position[i + 1], child_path("bodies", i));
-    model.data.body_names.push_back(model.scene.bodies[i].name);
-  }
+  for (std::size_t i = 0; i < model.scene.bodies.size(); ++i)
+    add_body(model, model.scene.bodies[i], child_path("bodies", i));
 }
 
 }  // namespace mbsopt

@@ -119,28 +119,24 @@ void add(Compilation& model, const BushingSpec& f, int force, const std::string&
   out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f.point1, where + ".point1")));
   out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f.point2, where + ".point2")));
   // R0 = A(p1)'A(p2), row by row
-  const FieldVector4 &p1 = model.orientation[static_cast<std::size_t>(out.body1)],
-                     &p2 = model.orientation[static_cast<std::size_t>(out.body2)];
-  const FieldVector4 relative = quaternion_product(inverse(p1), p2);
+  const FieldVector4 relative =
+      quaternion_product(inverse(model.orientation[at(out.body1)]), model.orientation[at(out.body2)]);
   FieldVector<9> R0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    FieldVector3 axis{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
-    axis[k] = model.fields.constant(1);
-    const FieldVector3 column = rotated(relative, axis);
-    for (std::size_t i = 0; i < 3; ++i) R0[3 * i + k] = column[i];
+  for (const int k : {0, 1, 2}) {
+    const FieldVector3 column = rotated(relative, model.fields.constants(Vector3d::Unit(k)));
+    for (std::size_t i = 0; i < 3; ++i) R0[3 * i + at(k)] = column[i];
   }
   const Vec<9> entries = numbers(model.keep(out.slot_R0, R0));
   for (int i = 0; i < 3; ++i) out.R0.row(i) = entries.segment<3>(3 * i).transpose();
   FieldVector<12> law;
-  const std::array<std::pair<const VectorField*, const char*>, 4> parts{
-      {{&f.stiffness, ".stiffness"},
-       {&f.damping, ".damping"},
-       {&f.torsional_stiffness, ".torsional_stiffness"},
-       {&f.torsional_damping, ".torsional_damping"}}};
-  for (std::size_t k = 0; k < parts.size(); ++k) {
-    const FieldVector3 x = model.fields.values(*parts[k].first, where + parts[k].second);
-    std::copy(x.begin(), x.end(), law.begin() + static_cast<std::ptrdiff_t>(3 * k));
-  }
+  auto next = law.begin();
+  const auto add_part = [&](const VectorField& field, const char* key) {
+    next = std::ranges::copy(model.fields.values(field, where + key), next).out;
+  };
+  add_part(f.stiffness, ".stiffness");
+  add_part(f.damping, ".damping");
+  add_part(f.torsional_stiffness, ".torsional_stiffness");
+  add_part(f.torsional_damping, ".torsional_damping");
   const Vec<12> x = numbers(model.keep(out.slot_law, law));
   out.K = x.segment<3>(0);
   out.C = x.segment<3>(3);

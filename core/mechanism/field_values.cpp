@@ -73,11 +73,6 @@ FieldVector4 unit(const FieldVector4& p) {
 
 FieldVector4 inverse(const FieldVector4& p) { return {p[0], -p[1], -p[2], -p[3]}; }
 
-FieldVector4 quaternion_product(const FieldVector4& a, const FieldVector4& b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-}
-
 FieldVector4 euler_parameters(const FieldVector3& unit_axis, const FieldValue& angle) {
   const FieldValue half = 0.5 * angle;
   const FieldValue c = cos(half), s = sin(half);

@@ -36,6 +36,7 @@ class FieldValues {
     return result;
   }
   FieldValue constant(double x) const { return FieldValue(x, Eigen::VectorXd::Zero(active_)); }
+  FieldVector<3> constants(const Vector3d& x) const { return {constant(x(0)), constant(x(1)), constant(x(2))}; }
 
   ScenePrograms& programs() const { return *programs_; }
   const Symbols& symbols() const { return programs_->symbols(); }
@@ -83,9 +84,16 @@ FieldVector3 perpendicular(const FieldVector3& a);
 // Component of n perpendicular to unit a, normalised.
 FieldVector3 perpendicular_part(const FieldVector3& n, const FieldVector3& a);
 
+// The product of two quaternions of numbers, fields or expressions.
+template <class Q>
+Q quaternion_product(const Q& a, const Q& b) {
+  return Q{
+      {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+       a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]}};
+}
+
 FieldVector4 unit(const FieldVector4& p);
 FieldVector4 inverse(const FieldVector4& p);  // of a unit p: the opposite rotation
-FieldVector4 quaternion_product(const FieldVector4& a, const FieldVector4& b);
 FieldVector4 euler_parameters(const FieldVector3& unit_axis, const FieldValue& angle);
 FieldVector3 rotated(const FieldVector4& p, const FieldVector3& s);  // A(p) s, p unit
 

@@ -11,6 +11,7 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/constraint/constraint.hpp"
+#include "core/mechanism/field_values.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/projection/projection.hpp"
@@ -31,14 +32,6 @@ constexpr double kOpen = 1e-6;  // |Phi| of a nearest approach, relative to the 
 constexpr double kSame = 1e-6;  // distance of equal modes, relative to the size of the mechanism
 
 double size_of(const VectorXd& x) { return x.lpNorm<Eigen::Infinity>(); }
-
-// a times b, of numbers or of expressions
-template <class Q>
-Q product(const Q& a, const Q& b) {
-  return Q{
-      {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-       a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]}};
-}
 
 double distance(const VectorXd& a, const VectorXd& b) {
   double sum = 0;
@@ -85,7 +78,7 @@ class RandomTurns {
         turn << std::sqrt(1 - u) * std::sin(a), std::sqrt(1 - u) * std::cos(a), std::sqrt(u) * std::sin(b),
             std::sqrt(u) * std::cos(b);
       }
-      q.segment<4>(i + 3) = product(turn, Vector4d(q.segment<4>(i + 3)));
+      q.segment<4>(i + 3) = quaternion_product(turn, Vector4d(q.segment<4>(i + 3)));
     }
     return q;
   }
@@ -114,8 +107,8 @@ Quaternion quaternion(const OrientationField& field) {
   if (const auto* const e = std::get_if<EulerParametersField>(&field)) return e->e;
   if (const auto* const about = std::get_if<AxisAngleField>(&field)) return rotation(about->axis, about->angle);
   const VectorField& rpy = std::get<RollPitchYawField>(field).rpy;
-  return product(rotation({0.0, 0.0, 1.0}, rpy[2]),
-                 product(rotation({0.0, 1.0, 0.0}, rpy[1]), rotation({1.0, 0.0, 0.0}, rpy[0])));
+  return quaternion_product(rotation({0.0, 0.0, 1.0}, rpy[2]),
+                            quaternion_product(rotation({0.0, 1.0, 0.0}, rpy[1]), rotation({1.0, 0.0, 0.0}, rpy[0])));
 }
 
 // The orientation turned in global axes.
@@ -129,7 +122,7 @@ OrientationField turned(const OrientationField& given, const Vector4d& turn) {
     if (axis.cross(v).norm() <= kParallel)
       return AxisAngleField{about->axis, about->angle + Expression(2 * std::atan2(axis.dot(v), turn(0)))};
   }
-  return EulerParametersField{product({turn(0), turn(1), turn(2), turn(3)}, quaternion(given))};
+  return EulerParametersField{quaternion_product({turn(0), turn(1), turn(2), turn(3)}, quaternion(given))};
 }
 
 }  // namespace
@@ -185,7 +178,7 @@ void set_guess(Scene& scene, const Mechanism& mechanism, const AssemblyMode& mod
       x = x.is_number() ? Field(r(i)) : Field(x + Expression(r(i) - r0(i)));
     }
     const Vector4d inverse(p0(0), -p0(1), -p0(2), -p0(3));
-    body.orientation = turned(body.orientation, product(p, inverse));
+    body.orientation = turned(body.orientation, quaternion_product(p, inverse));
   }
 }
 
