@@ -19,13 +19,11 @@ namespace mbsopt {
 
 using Primitive = std::variant<Coincidence, Dot1, Dot2, Distance, Angle, Coordinate>;
 
-struct Constraint {
+struct Constraint : BodyPair {
   Primitive primitive;
-  int joint = -1, drive = -1;              // index in the scene of the one that it belongs to
-  int body1 = 0, body2 = 0;                // 0 is the ground
-  int row = 0;                             // first row in Phi
-  int block = 0;                           // first row among the Jacobian blocks of all constraints
-  int slot1 = -1, slot2 = -1, slot3 = -1;  // first row of s1, s2, s3 among the differentiated fields; -1: constant
+  int joint = -1, drive = -1;  // index in the scene of the one that it belongs to
+  int row = 0;                 // first row in Phi
+  int block = 0;               // first row among the Jacobian blocks of all constraints
   double factor = 1;
   int slot_factor = -1;
   // The followed joint angle whose branch an Angle takes, or kNearestLaw.

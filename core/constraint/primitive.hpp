@@ -32,6 +32,12 @@ struct Multipliers {
   static Multipliers zero() { return {Vec<Rows>::Zero(), Vec<Rows>::Zero(), Vec<Rows>::Zero(), Vec<Rows>::Zero()}; }
 };
 
+// The two bodies of a primitive, and the first rows of its s1, s2, s3 among the differentiated fields.
+struct BodyPair {
+  int body1 = 0, body2 = 0;                // 0 is the ground
+  int slot1 = -1, slot2 = -1, slot3 = -1;  // -1: constant
+};
+
 // Gradient in the vectors of a primitive.
 struct GeometryBar {
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero(), s3 = Vector3d::Zero();

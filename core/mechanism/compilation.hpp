@@ -56,9 +56,8 @@ struct Compilation {
   // if the vector lies along axis2.
   FieldVector3 normal_in_file(int body1, const FieldVector3& normal1, int body2, const FieldVector3& axis2) const;
 
-  // Add a constraint on rows of its own, or as a further term of the last row.
-  Constraint& add_constraint(Constraint constraint);
-  Constraint& add_term(Constraint constraint);
+  // Adds a constraint on rows of its own. Returns the first of them.
+  int add_constraint(Constraint constraint);
   // The angle or displacement of a joint as a constraint without rows. Throws SceneError if the joint has none. With
   // Zero::start an angle without normals is zero at the orientations in the file. Otherwise both normals are one
   // vector.
@@ -68,6 +67,8 @@ struct Compilation {
   FieldValue joint_displacement_in_file(const std::string& joint, const std::string& where) const;
 
  private:
+  int add_angle(int body1, int body2, const FieldVector3& a1, const FieldVector3& n1, const FieldVector3& n2);
+
   std::unordered_map<std::string_view, int> bodies_;  // by name, as the next
   std::unordered_map<std::string_view, std::size_t> joints_;
   std::map<std::pair<std::size_t, Zero>, int> angle_of_joint_;

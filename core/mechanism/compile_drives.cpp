@@ -81,7 +81,7 @@ void compile_drives(Compilation& model) {
     Constraint c = measured(model, drive, where);
     c.drive = static_cast<int>(i);
     model.data.drive_names.push_back(drive.name);
-    const int row = model.add_constraint(std::move(c)).row;
+    const int row = model.add_constraint(std::move(c));
     model.data.laws.push_back({row, law_of(model, drive, where), static_cast<int>(i)});
   }
 }

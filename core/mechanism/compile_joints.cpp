@@ -71,10 +71,8 @@ class JointVectors {
     }
     return n;
   }
-  FieldVector3 global_axis(int body, std::size_t k) const {
-    FieldVector3 e{model_.fields.constant(0), model_.fields.constant(0), model_.fields.constant(0)};
-    e[k] = model_.fields.constant(1);
-    return rotated(inverse(model_.orientation[at(body)]), e);
+  FieldVector3 global_axis(int body, Eigen::Index k) const {
+    return rotated(inverse(model_.orientation[at(body)]), model_.fields.constants(Vector3d::Unit(k)));
   }
 
   Compilation& model_;
@@ -97,36 +95,23 @@ void set_vectors(Compilation& model, Constraint& c, JointVectors& of, JointVecto
 }
 
 void add_constant(Compilation& model, int row, const FieldValue& value) {
-  RowLaw law;
-  law.row = row;
-  law.law.constant = value.value();
-  law.law.slot = model.fields.slot(value);
-  model.data.laws.push_back(std::move(law));
+  model.data.laws.push_back({row, {value.value(), model.fields.slot(value), nullptr}});
 }
 
 template <class P>
-void place(const JointMeasure<P>& joint, Constraint& c) {
-  c.primitive = joint.measure;
-  c.body1 = joint.body1;
-  c.body2 = joint.body2;
-  c.slot1 = joint.slot1;
-  c.slot2 = joint.slot2;
-  c.slot3 = joint.slot3;
-}
-
-void set_factor(Compilation& model, Constraint& c, const FieldValue& factor) {
-  c.factor = factor.value();
-  c.slot_factor = model.fields.slot(factor);
+Constraint term_of(const JointMeasure<P>& joint) {
+  return {joint, joint.measure};
 }
 
 // Phi = second - factor * first - constant
 void tie(Compilation& model, int joint, Constraint second, Constraint first, const FieldValue& factor,
          const FieldValue& constant) {
   second.joint = first.joint = joint;
-  const int row = model.add_constraint(std::move(second)).row;
-  set_factor(model, first, -factor);
-  model.add_term(std::move(first));
-  if (constant.value() != 0 || !constant.derivatives().isZero(0)) add_constant(model, row, constant);
+  first.row = model.add_constraint(std::move(second));
+  first.factor = -factor.value();
+  first.slot_factor = model.fields.slot(-factor);
+  if (constant.value() != 0 || !constant.derivatives().isZero(0)) add_constant(model, first.row, constant);
+  model.data.constraints.push_back(std::move(first));
 }
 
 void add_joint(Compilation& model, std::size_t i) {
@@ -189,30 +174,22 @@ FieldVector3 Compilation::normal_in_file(int body1, const FieldVector3& normal1,
   return perpendicular_part(rotated(inverse(orientation[at(body2)]), global), axis2);
 }
 
-Constraint& Compilation::add_constraint(Constraint c) {
+int Compilation::add_constraint(Constraint c) {
   c.row = data.m;
   data.m += c.rows();
   data.constraints.push_back(std::move(c));
-  return data.constraints.back();
-}
-
-Constraint& Compilation::add_term(Constraint c) {
-  c.row = data.m - 1;
-  data.constraints.push_back(std::move(c));
-  return data.constraints.back();
+  return data.constraints.back().row;
 }
 
 Constraint Compilation::joint_angle_term(const std::string& name, Zero zero, const std::string& where) {
-  Constraint c;
-  c.angle = angle_of(name, where, zero);
-  place(data.angles[at(c.angle)], c);
+  const int angle = angle_of(name, where, zero);
+  Constraint c = term_of(data.angles[at(angle)]);
+  c.angle = angle;
   return c;
 }
 
 Constraint Compilation::joint_displacement_term(const std::string& name, const std::string& where) {
-  Constraint c;
-  place(joint_displacement(name, where), c);
-  return c;
+  return term_of(joint_displacement(name, where));
 }
 
 JointDisplacement Compilation::joint_displacement(const std::string& name, const std::string& where) {
@@ -253,15 +230,13 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
   if (!recipe || !recipe->has_angle) {
     throw SceneError(where + ": joint '" + name + "' is " + joint.type + " and has no angle");
   }
-  JointAngle angle;
-  angle.body1 = body_index(joint.body1, joint_path);
-  angle.body2 = body_index(joint.body2, joint_path);
-  const FieldVector3 a1 = direction(angle.body1, joint.axis1, joint_path + ".axis1");
-  const FieldVector3 a2 = direction(angle.body2, joint.axis2, joint_path + ".axis2");
+  const int body1 = body_index(joint.body1, joint_path), body2 = body_index(joint.body2, joint_path);
+  const FieldVector3 a1 = direction(body1, joint.axis1, joint_path + ".axis1");
+  const FieldVector3 a2 = direction(body2, joint.axis2, joint_path + ".axis2");
   FieldVector3 n1, n2;
   if (joint.normal1 && joint.normal2) {
-    n1 = perpendicular_part(direction(angle.body1, joint.normal1, joint_path + ".normal1"), a1);
-    n2 = perpendicular_part(direction(angle.body2, joint.normal2, joint_path + ".normal2"), a2);
+    n1 = perpendicular_part(direction(body1, joint.normal1, joint_path + ".normal1"), a1);
+    n2 = perpendicular_part(direction(body2, joint.normal2, joint_path + ".normal2"), a2);
     if (!numbers(n1).allFinite() || !numbers(n2).allFinite()) {
       throw SceneError(joint_path + ": a normal is parallel to its axis; it must have a part perpendicular to it");
     }
@@ -279,28 +254,27 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
                        ": its angle is used, and a parameter turns axis1 away from axis2: give normal1 and normal2");
     }
     n1 = perpendicular(a1);
-    n2 = zero == Zero::normals ? perpendicular(a2) : normal_in_file(angle.body1, n1, angle.body2, a2);
+    n2 = zero == Zero::normals ? perpendicular(a2) : normal_in_file(body1, n1, body2, a2);
     if (!numbers(n2).allFinite()) {
       throw SceneError(joint_path +
                        ": its axes are at right angles in the file, so that its angle from the start is "
                        "not settled: give normal1 and normal2");
     }
   }
-  angle.measure.s1 = numbers(keep(angle.slot1, n1));
-  angle.measure.s3 = numbers(keep(angle.slot3, cross(a1, n1)));
-  angle.measure.s2 = numbers(keep(angle.slot2, n2));
-  data.angles.push_back(angle);
-  return angle_of_joint_[{i, zero}] = static_cast<int>(data.angles.size()) - 1;
+  return angle_of_joint_[{i, zero}] = add_angle(body1, body2, a1, n1, n2);
 }
 
 int Compilation::angle_about(int body1, int body2, const std::optional<PointField>& axis, const std::string& where) {
-  JointAngle angle;
-  angle.body1 = body1;
-  angle.body2 = body2;
   const FieldVector3 a = direction(body1, axis, where + ".axis"), n = perpendicular(a);
-  angle.measure.s1 = numbers(keep(angle.slot1, n));
-  angle.measure.s3 = numbers(keep(angle.slot3, cross(a, n)));
-  angle.measure.s2 = numbers(keep(angle.slot2, n));
+  return add_angle(body1, body2, a, n, n);
+}
+
+int Compilation::add_angle(int body1, int body2, const FieldVector3& a1, const FieldVector3& n1,
+                           const FieldVector3& n2) {
+  JointAngle angle{{body1, body2}, {}};
+  angle.measure.s1 = numbers(keep(angle.slot1, n1));
+  angle.measure.s3 = numbers(keep(angle.slot3, cross(a1, n1)));
+  angle.measure.s2 = numbers(keep(angle.slot2, n2));
   data.angles.push_back(angle);
   return static_cast<int>(data.angles.size()) - 1;
 }

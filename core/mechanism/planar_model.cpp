@@ -109,13 +109,8 @@ class PlanarCompilation {
   }
 
   std::string add(const Constraint& c) {
-    PlanarConstraint out;
-    out.body1 = c.body1;
-    out.body2 = c.body2;
+    PlanarConstraint out{c};
     out.row = c.row;
-    out.slot1 = c.slot1;
-    out.slot2 = c.slot2;
-    out.slot3 = c.slot3;
     out.factor = c.factor;
     out.slot_factor = c.slot_factor;
     out.angle = c.angle;

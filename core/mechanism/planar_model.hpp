@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/body/complex.hpp"
+#include "core/constraint/primitive.hpp"
 
 namespace mbsopt {
 
@@ -32,14 +33,12 @@ struct PlanarBody {
 };
 
 // A primitive (constraint.hpp) in the plane.
-struct PlanarConstraint {
+struct PlanarConstraint : BodyPair {
   enum class Kind { point, dot1, dot2, distance, angle };
   Kind kind = Kind::point;
-  int body1 = 0, body2 = 0;
-  int row = 0, row2 = 0;  // number of its row (PlanarModel::rows); row2: of a point's second coordinate
-  Plane s1, s2, s3;       // parts in the plane of the primitive's vectors
-  double sign = 1;        // angle: about +n or -n
-  int slot1 = -1, slot2 = -1, slot3 = -1;  // of the primitive's vectors, three rows each
+  int row = 0, row2 = 0;   // number of its row (PlanarModel::rows); row2: of a point's second coordinate
+  Plane s1{}, s2{}, s3{};  // parts in the plane of the primitive's vectors
+  double sign = 1;         // angle: about +n or -n
   double factor = 1;
   int slot_factor = -1, angle = -1;
 };

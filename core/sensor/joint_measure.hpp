@@ -10,11 +10,9 @@ namespace mbsopt {
 
 struct Dot2;  // core/constraint/dot2.hpp
 
-template <class P>  // Angle or Dot2
-struct JointMeasure {
-  int body1 = 0, body2 = 0;
+template <class P>  // Angle, Dot2 or Coordinate
+struct JointMeasure : BodyPair {
   P measure;
-  int slot1 = -1, slot2 = -1, slot3 = -1;  // first row of the measure's s1, s2, s3 among the differentiated fields
 
   // An angle lies within half a turn of zero.
   double value(const Frame& f1, const Frame& f2) const {
