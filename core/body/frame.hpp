@@ -35,6 +35,11 @@ struct FrameBar {
   Matrix3d A, Adot, Addot, A_eta;
   Vector4d p, pdot, pddot, p_eta;
   void set_zero();
+  static FrameBar zero() {
+    FrameBar bar;
+    bar.set_zero();
+    return bar;
+  }
 };
 
 // The tangent of a Frame in kLanes directions. Matrices are stored entry by entry: row 3 i + j holds entry (i, j).

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/constraint/constraint.hpp"
+#include "core/mechanism/constraint_gradient.hpp"
 
 namespace mbsopt {
 namespace {
@@ -30,14 +30,6 @@ Vec<M> rows(const Eigen::VectorXd* z, int row, double scale) {
   return scale * z->segment<M>(row);
 }
 
-// Puts an angle on the branch of the followed joint angle, or on the branch nearest to the row's law.
-template <class P>
-void put_on_branch(const Constraint& c, const RowLaws& laws, const Eigen::VectorXd& angles, Vec<P::kRows>& value) {
-  if constexpr (std::is_same_v<P, Angle>) {
-    value(0) = Angle::on_branch(value(0), c.angle == Constraint::kNearestLaw ? laws.f_or_zero(c.row) : angles(c.angle));
-  }
-}
-
 void add_tangent(const Constraint& c, const std::vector<Frame>& frames, const RowLaws& laws,
                  const Eigen::VectorXd& angles, const FrameTangent& t1, const FrameTangent& t2,
                  const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
@@ -57,11 +49,10 @@ void add_tangent(const Constraint& c, const std::vector<Frame>& frames, const Ro
         loads[j] += c.factor * t.load2;
         Lanes<1> storage;
         if (const Lanes<1>* factor_dir = block.field<1>(c.slot_factor, storage)) {
-          Vec<m> phi, phi_dot, phi_ddot;
-          p.phi(frames[i], frames[j], phi);
+          const Vec<m> phi = phi_of(c, p, frames[i], frames[j], laws, angles);
+          Vec<m> phi_dot, phi_ddot;
           p.phi_dot(frames[i], frames[j], phi_dot);
           p.phi_ddot(frames[i], frames[j], phi_ddot);
-          put_on_branch<P>(c, laws, angles, phi);
           out.phi.middleRows<m>(c.row) += phi * *factor_dir;
           out.phi_dot.middleRows<m>(c.row) += phi_dot * *factor_dir;
           out.phi_ddot.middleRows<m>(c.row) += phi_ddot * *factor_dir;
@@ -80,8 +71,7 @@ void ConstraintTerms::phi(const Frames& frames, const RowLaws& laws, const Eigen
                           Eigen::VectorXd& out) const {
   for_each(*data_, frames, out,
            [&]<class P>(const Constraint& c, const P& p, const Frame& a, const Frame& b, Vec<P::kRows>& value) {
-             p.phi(a, b, value);
-             put_on_branch<P>(c, laws, angles, value);
+             value = phi_of(c, p, a, b, laws, angles);
            });
   laws.subtract(0, out);
 }
@@ -117,11 +107,10 @@ void ConstraintTerms::add_pull_back(const Frames& frames, RowLaws& laws, const E
           if (c.slot_factor >= 0) {
             const Multipliers<m> unscaled{rows<m>(weights.lambda, c.row, scale), rows<m>(weights.mu0, c.row, scale),
                                           rows<m>(weights.mu1, c.row, scale), rows<m>(weights.mu2, c.row, scale)};
-            Vec<m> phi, phi_dot, phi_ddot;
-            p.phi(f1, f2, phi);
+            const Vec<m> phi = phi_of(c, p, f1, f2, laws, angles);
+            Vec<m> phi_dot, phi_ddot;
             p.phi_dot(f1, f2, phi_dot);
             p.phi_ddot(f1, f2, phi_ddot);
-            put_on_branch<P>(c, laws, angles, phi);
             theta_bar(c.slot_factor) += unscaled.lambda.dot(virtual_change(p, f1, f2)) + unscaled.mu0.dot(phi) +
                                         unscaled.mu1.dot(phi_dot) + unscaled.mu2.dot(phi_ddot);
           }

@@ -30,8 +30,7 @@ struct AngularMomentumSensor final : SensorFunction {
       const BodyAt b = body_at(at.y, i);
       const Frame& f = b.frame;
       const Vector3d omega = b.state.omega(), z_B = f.A.transpose() * z, omega_bar = body.J * z_B;
-      FrameBar bar;
-      bar.set_zero();
+      FrameBar bar = FrameBar::zero();
       bar.r = body.mass * f.rdot.cross(z);
       bar.rdot = body.mass * z.cross(f.r);
       bar.A = z * (body.J * omega).transpose();

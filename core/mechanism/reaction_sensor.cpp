@@ -2,9 +2,8 @@
 
 #include <cassert>
 
-#include "core/constraint/constraint.hpp"
+#include "core/mechanism/constraint_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/mechanism/virtual_work.hpp"
 
 namespace mbsopt {
 namespace {
@@ -47,8 +46,8 @@ void add_pull_back_of_loads(const ReactionSensor& s, const Eigen::VectorXd& y, c
                             const Vec<6>& eta, SensorGradient& to, Eigen::VectorXd& lambda_bar) {
   for (const Constraint& c : to.data.constraints) {
     if (c.joint != s.joint) continue;
-    const ConstraintRows change =
-        add_virtual_work_gradient(c, body_at(y, c.body1), body_at(y, c.body2), Vec<6>::Zero(), eta, -lambda.segment(c.row, c.rows()), to);
+    const ConstraintVector change = add_virtual_work_gradient(
+        c, body_at(y, c.body1), body_at(y, c.body2), Vec<6>::Zero(), eta, -lambda.segment(c.row, c.rows()), to);
     lambda_bar.segment(c.row, c.rows()) -= to.scale * c.factor * change;
   }
 }
@@ -88,8 +87,7 @@ double ReactionSensor::evaluate(const MechanismData& d, const Eigen::VectorXd& y
   if (!torque) return result;
   // The gradient through eta itself, with F and T fixed.
   const Vector3d arm_bar = c.cross(loads.F);
-  FrameBar bar;
-  bar.set_zero();
+  FrameBar bar = FrameBar::zero();
   bar.A = c * loads.T.transpose() + arm_bar * s2.transpose();
   to->add_frame(b2, body2, bar);
   to->add_slot<3>(slot_s2, Vec<3>(A2.transpose() * arm_bar));

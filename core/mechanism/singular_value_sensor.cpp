@@ -9,18 +9,18 @@
 // occurs twice has no derivative; the gradient is then that of one of the two. Source of dsigma: G. H. Golub, C. F. Van
 // Loan, "Matrix Computations", section 8.6.
 #include <cmath>
+#include <optional>
 
 #include "core/body/state_layout.hpp"
-#include "core/constraint/constraint.hpp"
 #include "core/linear/dense.hpp"
+#include "core/mechanism/constraint_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/mechanism/virtual_work.hpp"
 
 namespace mbsopt {
 namespace {
 
 struct Scaled {
-  std::vector<BodyAt> bodies;   // the ground first
+  std::optional<BodiesAt> bodies;
   Eigen::MatrixXd J;            // rows of length 1
   Eigen::VectorXd norms;        // |j_i|
   double length = 1;            // L [m]
@@ -44,20 +44,9 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
   for_each_point(d, [&](const Vector3d& s, int) { sum += s.squaredNorm(), ++out.points; });
   if (sum > 0) out.length = std::sqrt(sum / out.points);
 
-  const StateLayout layout{d.n};
-  out.J = Eigen::MatrixXd::Zero(d.m, 6 * d.n);
-  for (int body = 0; body <= d.n; ++body) out.bodies.push_back(body_at(y, body));
-  for (const Constraint& c : d.constraints) {
-    std::visit(
-        [&]<class P>(const P& p) {
-          Mat<P::kRows, 6> J1, J2;
-          p.jacobian(out.bodies[at(c.body1)].frame, out.bodies[at(c.body2)].frame, J1, J2);
-          J1.template rightCols<3>() /= out.length, J2.template rightCols<3>() /= out.length;
-          if (c.body1 > 0) out.J.block<P::kRows, 6>(c.row, layout.z(c.body1)) += c.factor * J1;
-          if (c.body2 > 0) out.J.block<P::kRows, 6>(c.row, layout.z(c.body2)) += c.factor * J2;
-        },
-        c.primitive);
-  }
+  out.bodies.emplace(y);
+  out.J = jacobian_in_motions(d, out.bodies->frames);
+  for (Eigen::Index k = 3; k < out.J.cols(); k += 6) out.J.middleCols<3>(k) /= out.length;
   out.norms = out.J.rowwise().norm();
   for (Eigen::Index i = 0; i < out.J.rows(); ++i)
     if (out.norms(i) > 0) out.J.row(i) /= out.norms(i);
@@ -89,8 +78,8 @@ struct SingularValueFunction final : SensorFunction {
         const auto part = [&](int body) {
           return body > 0 ? Vec<6>(W.block<1, 6>(c.row + i, layout.z(body)).transpose()) : Vec<6>(Vec<6>::Zero());
         };
-        add_virtual_work_gradient(c, x.bodies[at(c.body1)], x.bodies[at(c.body2)], part(c.body1), part(c.body2),
-                                  ConstraintRows::Unit(c.rows(), i), *to);
+        add_virtual_work_gradient(c, x.bodies->body(c.body1), x.bodies->body(c.body2), part(c.body1), part(c.body2),
+                                  ConstraintVector::Unit(c.rows(), i), *to);
       }
     for_each_point(
         d, [&](const Vector3d& s, int slot) { to->add_slot<3>(slot, Vec<3>(L_bar / (x.points * x.length) * s)); });

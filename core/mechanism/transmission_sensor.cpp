@@ -38,8 +38,7 @@ struct TransmissionFunction final : SensorFunction {
 
  private:
   static void add(const Link& link, const BodyAt& body, const Vector3d& x_bar, SensorGradient& to) {
-    FrameBar bar;
-    bar.set_zero();
+    FrameBar bar = FrameBar::zero();
     bar.A = x_bar * link.s.transpose();
     to.add_frame(body, link.body, bar);
     to.add_slot<3>(link.slot, Vec<3>(body.frame.A.transpose() * x_bar));

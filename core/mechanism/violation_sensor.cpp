@@ -2,10 +2,8 @@
 #include <cmath>
 
 #include "core/body/state_layout.hpp"
-#include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
-#include "core/mechanism/row_laws.hpp"
-#include "core/mechanism/sensor_gradient.hpp"
+#include "core/mechanism/constraint_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 
 namespace mbsopt {
@@ -23,23 +21,6 @@ RowLaws laws_at(const MechanismData& d, double t) {
   return laws;
 }
 
-template <class P>
-Vec<P::kRows> phi_of(const RowLaws& laws, const Constraint& c, const P& p, const BodyAt& b1, const BodyAt& b2,
-                     const Eigen::VectorXd& angles) {
-  Vec<P::kRows> phi;
-  p.phi(b1.frame, b2.frame, phi);
-  if constexpr (std::is_same_v<P, Angle>) {
-    double reference = 0;
-    if (c.angle == Constraint::kNearestLaw) {
-      reference = laws.f_or_zero(c.row);
-    } else if (c.angle < angles.size()) {
-      reference = angles(c.angle);
-    }
-    phi(0) = Angle::on_branch(phi(0), reference);
-  }
-  return phi;
-}
-
 Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   const RowLaws laws = laws_at(d, t);
   Violation worst;
@@ -53,7 +34,7 @@ Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorX
     const bool last_term = i + 1 == d.constraints.size() || d.constraints[i + 1].row != c.row;
     std::visit(
         [&](const auto& p) {
-          const auto phi = phi_of(laws, c, p, b1, b2, angles);
+          const auto phi = phi_of(c, p, b1.frame, b2.frame, laws, angles);
           sum += c.factor * phi(0);
           if (!last_term) return;
           offer(sum - laws.f_or_zero(c.row), c.row, 0);
@@ -91,23 +72,15 @@ struct ViolationFunction final : SensorFunction {
     for (const Constraint& c : d.constraints) {
       if (worst.row < c.row || worst.row >= c.row + c.rows()) continue;
       const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
-      FrameBar bar1, bar2;
-      bar1.set_zero();
-      bar2.set_zero();
-      GeometryBar s_bar;
       std::visit(
           [&]<class P>(const P& p) {
             Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
             z.mu0(worst.row - c.row) = c.factor;
-            p.pull_back(b1.frame, b2.frame, z, bar1, bar2, s_bar);
-            if (c.slot_factor < 0) return;
-            const double value = phi_of(laws, c, p, b1, b2, angles)(worst.row - c.row);
+            add_primitive_gradient(p, c, b1, b2, z, to);
+            const double value = phi_of(c, p, b1.frame, b2.frame, laws, angles)(worst.row - c.row);
             to.add_slot<1>(c.slot_factor, Vec<1>(value));
           },
           c.primitive);
-      to.add_frame(b1, c.body1, bar1);
-      to.add_frame(b2, c.body2, bar2);
-      to.add_slot<3>(c.slot1, s_bar.s1), to.add_slot<3>(c.slot2, s_bar.s2), to.add_slot<3>(c.slot3, s_bar.s3);
     }
   }
 };

@@ -13,6 +13,16 @@ BodyAt body_at(const Eigen::VectorXd& y, int body) {
   return b;
 }
 
+BodiesAt::BodiesAt(const Eigen::VectorXd& y) {
+  const StateLayout layout = StateLayout::of(y);
+  states.resize(at(layout.n) + 1);
+  frames.resize(states.size());
+  for (std::size_t k = 1; k < states.size(); ++k) {
+    set_position(y.segment<7>(layout.q(k)), states[k], frames[k]);
+    set_velocity(y.segment<7>(layout.v(k)), states[k], frames[k]);
+  }
+}
+
 void add_pull_back(const BodyAt& b, int body, const FrameBar& bar, double scale, Eigen::Ref<Eigen::VectorXd> y_bar) {
   if (body == 0) return;
   const StateLayout layout = StateLayout::of(y_bar);

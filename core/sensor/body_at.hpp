@@ -1,5 +1,7 @@
-// One body of a state, prepared for sensors: its Euler parameters and its frame with velocities.
+// Bodies of a state, prepared for sensors: their Euler parameters and their frames with velocities.
 #pragma once
+
+#include <vector>
 
 #include "core/body/frame.hpp"
 
@@ -13,6 +15,15 @@ struct BodyAt {
 // body: 0 is the ground; y = (q, v) of n bodies.
 BodyAt body_at(const Eigen::VectorXd& y, int body);
 
+// All bodies of a state. They begin with the ground.
+struct BodiesAt {
+  explicit BodiesAt(const Eigen::VectorXd& y);
+  BodyAt body(int k) const { return {states[at(k)], frames[at(k)]}; }
+  std::vector<BodyState> states;
+  std::vector<Frame> frames;
+};
+
+// y_bar += scale times a gradient in the frame.
 void add_pull_back(const BodyAt& b, int body, const FrameBar& bar, double scale, Eigen::Ref<Eigen::VectorXd> y_bar);
 
 }  // namespace mbsopt

@@ -7,8 +7,7 @@
 #include "core/body/state_layout.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/dynamics/constraint_terms.hpp"
-#include "core/constraint/constraint.hpp"
-#include "core/mechanism/sensor_gradient.hpp"
+#include "core/mechanism/constraint_gradient.hpp"
 #include "core/mechanism/followed_angles.hpp"
 
 namespace mbsopt {
@@ -204,10 +203,8 @@ void AssemblyEquations::for_joint_gradients(AssemblyLevel level, const BodiesAt&
           for (int i = 0; i < P::kRows; ++i) {
             Multipliers<P::kRows> unit = Multipliers<P::kRows>::zero();
             (positions ? unit.mu0 : unit.mu1) = c.factor * Vec<P::kRows>::Unit(i);
-            FrameBar bar1, bar2;
+            FrameBar bar1 = FrameBar::zero(), bar2 = bar1;
             GeometryBar s;
-            bar1.set_zero();
-            bar2.set_zero();
             p.pull_back(f1, f2, unit, bar1, bar2, s);
             const Index row = c.row + i;
             add_body(row, c.body1, bar1);
@@ -217,11 +214,8 @@ void AssemblyEquations::for_joint_gradients(AssemblyLevel level, const BodiesAt&
             add_field(row, c.slot3, s.s3);
           }
           if (c.slot_factor < 0) return;
-          Vec<P::kRows> phi;
-          positions ? p.phi(f1, f2, phi) : p.phi_dot(f1, f2, phi);
-          if (positions && std::is_same_v<P, Angle>)
-            phi(0) = Angle::on_branch(phi(0),
-                                      c.angle == Constraint::kNearestLaw ? laws_.f_or_zero(c.row) : angles_(c.angle));
+          Vec<P::kRows> phi = phi_of(c, p, f1, f2, laws_, angles_);
+          if (!positions) p.phi_dot(f1, f2, phi);
           add_field(c.row, c.slot_factor, Vec<1>(phi(0)));
         },
         c.primitive);

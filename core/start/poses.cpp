@@ -2,7 +2,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
-#include "core/constraint/constraint.hpp"
+#include "core/mechanism/constraint_gradient.hpp"
 
 namespace mbsopt {
 
@@ -15,16 +15,6 @@ VectorXd position_guess(const MechanismData& d) {
   VectorXd q(layout.positions());
   for (std::size_t k = 1; k < d.bodies.size(); ++k) q.segment<7>(layout.q(k)) = d.bodies[k].q;
   return q;
-}
-
-BodiesAt::BodiesAt(const VectorXd& y) {
-  const StateLayout layout = StateLayout::of(y);
-  states.resize(at(layout.n) + 1);
-  frames.resize(states.size());
-  for (std::size_t k = 1; k < states.size(); ++k) {
-    set_position(y.segment<7>(layout.q(k)), states[k], frames[k]);
-    set_velocity(y.segment<7>(layout.v(k)), states[k], frames[k]);
-  }
 }
 
 MatrixXd rates_of_poses(const VectorXd& q, const MatrixXd& xi) {
@@ -40,19 +30,7 @@ MatrixXd rates_of_poses(const VectorXd& q, const MatrixXd& xi) {
 }
 
 UnitRows unit_rows(const MechanismData& data, const std::vector<Frame>& frames) {
-  const StateLayout layout{data.n};
-  MatrixXd rows = MatrixXd::Zero(data.m, 6 * data.n);
-  for (const Constraint& c : data.constraints) {
-    std::visit(
-        [&]<class P>(const P& p) {
-          Mat<P::kRows, 6> J1, J2;
-          p.jacobian(frames[at(c.body1)], frames[at(c.body2)], J1, J2);
-          if (c.body1 > 0) rows.block<P::kRows, 6>(c.row, layout.z(c.body1)) += c.factor * J1;
-          if (c.body2 > 0) rows.block<P::kRows, 6>(c.row, layout.z(c.body2)) += c.factor * J2;
-        },
-        c.primitive);
-  }
-  return UnitRows(rows);
+  return UnitRows(jacobian_in_motions(data, frames));
 }
 
 MatrixXd JointSolver::solve(const MatrixXd& b) const { return factor_.solve(rows_.scale.asDiagonal() * b); }

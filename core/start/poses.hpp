@@ -5,22 +5,15 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/body/frame.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/sensor/body_at.hpp"
 #include "core/start/nearest_point_linearisation.hpp"
 
 namespace mbsopt {
 
 // The poses of all bodies in the scene, from which an assembly starts.
 Eigen::VectorXd position_guess(const MechanismData& data);
-
-// The bodies at a state y = (q, v). They begin with the ground.
-struct BodiesAt {
-  explicit BodiesAt(const Eigen::VectorXd& y);
-  std::vector<BodyState> states;
-  std::vector<Frame> frames;
-};
 
 // Vectors per body, one after another.
 inline Eigen::Map<const Eigen::VectorXd> flat(const std::vector<Vec<6>>& x) {
