@@ -13,51 +13,50 @@
 namespace mbsopt {
 namespace {
 
-void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, SensorGradient& to) {
+// Adds the gradients to those that are not null.
+Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, SensorGradient* kinetic,
+              SensorGradient* potential) {
+  Energy e;
   const StateLayout layout{d.n};
   for (int i = 1; i <= d.n; ++i) {
-    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
+    const BodyData& body = d.bodies[at(i)];
     const BodyAt b = body_at(y, i);
-    const Vector3d w = b.state.omega(), w_bar = body.J * w;
-    to.y_bar.segment<3>(layout.v(i)) += to.scale * body.mass * b.frame.rdot;
-    // w = 2 G(p) pdot = -2 G(pdot) p
-    to.y_bar.segment<4>(layout.pdot(i)) += 2 * to.scale * G_transposed_times(b.state.p, w_bar);
-    to.y_bar.segment<4>(layout.p(i)) -= 2 * to.scale * G_transposed_times(b.state.pdot, w_bar);
-    to.add_slot<1>(body.slot_mass, Vec<1>(0.5 * b.frame.rdot.squaredNorm()));
-    to.add_slot<6>(body.slot_J, inertia_gradient(0.5 * w * w.transpose()));
+    const Vector3d &r = b.frame.r, &rdot = b.frame.rdot, w = b.state.omega(), w_bar = body.J * w;
+    e.kinetic += 0.5 * (body.mass * rdot.squaredNorm() + w.dot(w_bar));
+    e.potential -= body.mass * d.gravity.dot(r);
+    if (kinetic) {
+      kinetic->y_bar.segment<3>(layout.v(i)) += kinetic->scale * body.mass * rdot;
+      // w = 2 G(p) pdot = -2 G(pdot) p
+      kinetic->y_bar.segment<4>(layout.pdot(i)) += 2 * kinetic->scale * G_transposed_times(b.state.p, w_bar);
+      kinetic->y_bar.segment<4>(layout.p(i)) -= 2 * kinetic->scale * G_transposed_times(b.state.pdot, w_bar);
+      kinetic->add_slot<1>(body.slot_mass, Vec<1>(0.5 * rdot.squaredNorm()));
+      kinetic->add_slot<6>(body.slot_J, inertia_gradient(0.5 * w * w.transpose()));
+    }
+    if (potential) {
+      potential->y_bar.segment<3>(layout.q(i)) -= potential->scale * body.mass * d.gravity;
+      potential->add_slot<1>(body.slot_mass, Vec<1>(-d.gravity.dot(r)));
+      potential->add_slot<3>(d.slot_gravity, Vec<3>(-body.mass * r));
+    }
   }
-}
-
-void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
-                            SensorGradient& to) {
-  const StateLayout layout{d.n};
-  for (int i = 1; i <= d.n; ++i) {
-    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
-    const Vector3d r = y.segment<3>(layout.q(i));
-    to.y_bar.segment<3>(layout.q(i)) -= to.scale * body.mass * d.gravity;
-    to.add_slot<1>(body.slot_mass, Vec<1>(-d.gravity.dot(r)));
-    to.add_slot<3>(d.slot_gravity, Vec<3>(-body.mass * r));
-  }
-  FieldGradient fields = to.fields();
   d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
     const BodyAt b1 = body_at(y, i), b2 = body_at(y, j);
-    FrameBar bar1, bar2;
-    bar1.set_zero();
-    bar2.set_zero();
+    e.potential += f.potential(angles, b1.frame, b2.frame);
+    if (!potential) return;
+    FrameBar bar1 = FrameBar::zero(), bar2 = bar1;
+    FieldGradient fields = potential->fields();
     f.pull_back_potential(angles, b1.frame, b2.frame, bar1, bar2, fields);
-    to.add_frame(b1, i, bar1);
-    to.add_frame(b2, j, bar2);
+    potential->add_frame(b1, i, bar1);
+    potential->add_frame(b2, j, bar2);
   });
+  return e;
 }
 
 struct EnergyFunction final : SensorFunction {
   bool kinetic = true, potential = true;
 
   double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
-    if (to && kinetic) add_kinetic_gradient(d, at.y, *to);
-    if (to && potential) add_potential_gradient(d, at.y, at.angles, *to);
-    const Energy e = energy(d, at.y, at.angles);
+    const Energy e = energy(d, at.y, at.angles, kinetic ? to : nullptr, potential ? to : nullptr);
     return (kinetic ? e.kinetic : 0) + (potential ? e.potential : 0);
   }
 };
@@ -65,19 +64,7 @@ struct EnergyFunction final : SensorFunction {
 }  // namespace
 
 Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
-  Energy e;
-  for (int i = 1; i <= d.n; ++i) {
-    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
-    const BodyAt b = body_at(y, i);
-    const Vector3d w = b.state.omega();
-    e.kinetic += 0.5 * (body.mass * b.frame.rdot.squaredNorm() + w.dot(body.J * w));
-    e.potential -= body.mass * d.gravity.dot(b.frame.r);
-  }
-  d.forces->for_each([&](const auto& f) {
-    const auto [i, j] = f.bodies();
-    e.potential += f.potential(angles, body_at(y, i).frame, body_at(y, j).frame);
-  });
-  return e;
+  return energy(d, y, angles, nullptr, nullptr);
 }
 
 bool conserves_energy(const MechanismData& d) {

@@ -11,20 +11,13 @@ namespace {
 
 // The numbers for one evaluation of a law that is an expression, one set per thread. They carry nothing from one call
 // to the next, and grow at the first call only.
-Law::Scratch& scratch_of_this_thread(const MechanismData& data, const Program& program) {
+Law::Scratch& scratch_of_this_thread(const MechanismData& data, const Law& law) {
   static thread_local Law::Scratch scratch;
-  const std::size_t inputs = static_cast<std::size_t>(data.rho.size()) + 3;
-  if (scratch.inputs.size() != inputs) {
-    scratch.inputs.resize(inputs);
-    scratch.gradient.resize(inputs);
-  }
-  program.grow(scratch.program);
+  if (!law.program) return scratch;
+  scratch.inputs.resize(static_cast<std::size_t>(data.rho.size()) + 3);
+  scratch.gradient.resize(scratch.inputs.size());
+  law.program->grow(scratch.program);
   return scratch;
-}
-
-// A law of coefficients needs no scratch.
-Law::Scratch& scratch_for(const MechanismData& data, const Law& law, Law::Scratch& none) {
-  return law.program ? scratch_of_this_thread(data, *law.program) : none;
 }
 
 // Adds the gradient through the law's own coefficients, or through the parameters of its expression.
@@ -39,8 +32,7 @@ struct TensionFunction final : SensorFunction {
   double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
     double value = 0;
     d.forces->visit_law(place, [&](const auto& f) {
-      Law::Scratch none;
-      Law::Scratch& scratch = scratch_for(d, f.law, none);
+      Law::Scratch& scratch = scratch_of_this_thread(d, f.law);
       const auto [i, j] = f.bodies();
       const BodyAt b1 = body_at(at.y, i), b2 = body_at(at.y, j);
       const auto [x, xdot] = f.measured(at.angles, b1.frame, b2.frame);
@@ -50,9 +42,7 @@ struct TensionFunction final : SensorFunction {
       }
       const Law::Value law = f.law.derivatives(at.t, d.rho, x, xdot, scratch);
       add_law_gradient(f.law, x, xdot, scratch, *to);
-      FrameBar bar1, bar2;
-      bar1.set_zero();
-      bar2.set_zero();
+      FrameBar bar1 = FrameBar::zero(), bar2 = bar1;
       FieldGradient fields = to->fields();
       f.pull_back_measured(b1.frame, b2.frame, law.f_x, law.f_xdot, bar1, bar2, fields);
       to->add_frame(b1, i, bar1);
