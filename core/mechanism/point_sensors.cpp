@@ -19,8 +19,7 @@ void add_acceleration(const StatePoint& at, const BodyPoint& point, const Vector
   const BodyAt b = moving(at, point.body);
   to.add_slot<3>(point.slot, Vec<3>(b.frame.Addot.transpose() * X));
   if (point.body == 0) return;
-  FrameBar bar;
-  bar.set_zero();
+  FrameBar bar = FrameBar::zero();
   bar.Addot = to.scale * X * point.s.transpose();
   const StateLayout layout{to.data.n};
   add_pull_back(b.state, bar, Vector4d::Zero(), Vector3d::Zero(), to.y_bar.segment<7>(layout.q(point.body)),
@@ -40,8 +39,7 @@ BodyPoint sensor_point(Compilation& model, const std::string& body, const PointF
 
 void add_point(const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar, const Vector3d& V_bar,
                SensorGradient& to) {
-  FrameBar bar;
-  bar.set_zero();
+  FrameBar bar = FrameBar::zero();
   bar.r = X_bar;
   bar.rdot = V_bar;
   bar.A = X_bar * point.s.transpose();
@@ -54,7 +52,7 @@ namespace {
 
 // A position in the ground's axes needs neither velocities nor frames. Most objectives read such positions.
 bool is_place(const PointSensor& sensor) {
-  return sensor.quantity == PointSensor::Quantity::position && sensor.axes_body < 1;
+  return sensor.quantity == PointSensor::Quantity::position && sensor.axes_body == 0;
 }
 
 // Maps a body's r, e0 and e in y, where q comes first, without a copy.
@@ -89,111 +87,73 @@ void add_place(const BodyPoint& point, const Eigen::VectorXd& y, const Vector3d&
   to.add_slot<3>(point.slot, s_bar);
 }
 
-// Kinematic acceleration (without gravity) of a body point, or the plain difference of two.   [m/s^2]
-//   W = Pddot_a - Pddot_b,  Pddot = rddot + Addot s;   a component of R'W in the axes R of a body or global, or |W|
-// It depends on the state and on z = (rddot, omegadot) of the bodies, which the equations of motion give.
-struct AccelerationSensor final : SensorFunction, SeenPoints {
-  double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
-    Vector3d W = moving(at, a.body).frame.point_ddot(a.s);
-    if (relative) W -= moving(at, b.body).frame.point_ddot(b.s);
-    const BodyAt R = body_at(at.y, std::max(axes_body, 0));
-    const Vector3d seen = R.frame.A.transpose() * W;
-    if (!to) return component_value(seen, component);
-    const Vector3d direction = component_gradient(seen, component), W_bar = R.frame.A * direction;
-    FrameBar bar;
-    bar.set_zero();
-    bar.A = W * direction.transpose();
-    if (axes_body > 0 && component != kNorm) to->add_frame(R, axes_body, bar);
-    add_acceleration(at, a, W_bar, *to);
-    if (relative) add_acceleration(at, b, -W_bar, *to);
-    at.motion->fold_bar(at, to->y_bar, to->rho_bar);
-    return component_value(seen, component);
-  }
-};
-
-// Sets a point, perhaps relative to another one, and a component in some axes.
-void set_points(Compilation& model, const Sensor& s, SeenPoints& of, const std::string& where) {
-  of.a = sensor_point(model, s.body, s.point, where);
-  if (s.relative_to) {
-    of.relative = true;
-    of.b = sensor_point(model, s.relative_to->body, s.relative_to->point, where + ".relative_to");
-  }
-  of.component = component_of(s, where);
-  if (s.in_body_frame && of.a.body > 0) of.axes_body = of.a.body;
-}
-
 }  // namespace
 
 double PointSensor::evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const {
   const Eigen::VectorXd& y = at.y;
   if (is_place(*this)) {
     const Vector3d L = relative ? Vector3d(place(a, y) - place(b, y)) : place(a, y);
-    if (to) add_place(a, y, along(L), *to);
-    if (to && relative) add_place(b, y, -along(L), *to);
-    return pick(L);
+    const Vector3d direction = component_gradient(L, component);
+    if (to) add_place(a, y, direction, *to);
+    if (to && relative) add_place(b, y, -direction, *to);
+    return component_value(L, component);
   }
-  const Seen x = seen(y);
-  const Matrix3d &R = x.R.frame.A, &Rdot = x.R.frame.Adot;
-  const Vector3d L = R.transpose() * x.X;
-  double result = 0;
-  Vector3d X_bar = Vector3d::Zero(), V_bar = Vector3d::Zero();
-  FrameBar R_bar;
-  R_bar.set_zero();
-  if (quantity == Quantity::velocity) {
-    const Vector3d W = R.transpose() * x.V, direction = along(W);
-    result = pick(W);
-    V_bar = R * direction;
-    R_bar.A = x.V * direction.transpose();
-  } else if (quantity == Quantity::position) {
-    const Vector3d direction = along(L);
-    result = pick(L);
-    X_bar = R * direction;
-    R_bar.A = x.X * direction.transpose();
-  } else {
-    const Vector3d Ldot = Rdot.transpose() * x.X + R.transpose() * x.V, direction = along(L);
+  const bool moves = quantity == Quantity::acceleration, is_rate = quantity == Quantity::position_rate;
+  const auto placed = [&](int body) { return moves ? moving(at, body) : body_at(y, body); };
+  const BodyAt A = placed(a.body), B = relative ? placed(b.body) : BodyAt(), axes = body_at(y, axes_body);
+  const Matrix3d &R = axes.frame.A, &Rdot = axes.frame.Adot;
+  Vector3d X[] = {A.frame.point(a.s), A.frame.point_dot(a.s), A.frame.point_ddot(a.s)};
+  if (relative) X[0] -= B.frame.point(b.s), X[1] -= B.frame.point_dot(b.s), X[2] -= B.frame.point_ddot(b.s);
+  const int order = is_rate ? 0 : static_cast<int>(quantity);
+  const Vector3d L = R.transpose() * X[order], direction = component_gradient(L, component);
+  double result = component_value(L, component);
+  Vector3d X_bar[] = {Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()};
+  FrameBar R_bar = FrameBar::zero();
+  if (is_rate) {
+    const Vector3d Ldot = Rdot.transpose() * X[0] + R.transpose() * X[1];
     result = direction.dot(Ldot);
     Vector3d L_bar = Vector3d::Zero();
     if (component == kNorm && L.norm() > 0) L_bar = (Ldot - result * direction) / L.norm();
-    X_bar = Rdot * direction + R * L_bar;
-    V_bar = R * direction;
-    R_bar.A = x.V * direction.transpose() + x.X * L_bar.transpose();
-    R_bar.Adot = x.X * direction.transpose();
+    X_bar[0] = Rdot * direction + R * L_bar;
+    X_bar[1] = R * direction;
+    R_bar.A = X[1] * direction.transpose() + X[0] * L_bar.transpose();
+    R_bar.Adot = X[0] * direction.transpose();
+  } else {
+    X_bar[order] = R * direction;
+    R_bar.A = X[order] * direction.transpose();
   }
   if (!to) return result;
-  if (axes_body >= 1) to->add_frame(x.R, axes_body, R_bar);
-  add_point(x.A, a, X_bar, V_bar, *to);
-  if (relative) add_point(x.B, b, -X_bar, -V_bar, *to);
+  to->add_frame(axes, axes_body, R_bar);
+  const auto add = [&](const BodyAt& body, const BodyPoint& point, double sign) {
+    if (moves) return add_acceleration(at, point, sign * X_bar[2], *to);
+    add_point(body, point, sign * X_bar[0], sign * X_bar[1], *to);
+  };
+  add(A, a, 1);
+  if (relative) add(B, b, -1);
+  if (moves) at.motion->fold_bar(at, to->y_bar, to->rho_bar);
   return result;
 }
 
-PointSensor::Seen PointSensor::seen(const Eigen::VectorXd& y) const {
-  Seen x{body_at(y, a.body), body_at(y, b.body), body_at(y, std::max(axes_body, 0)), {}, {}};
-  x.X = x.A.frame.point(a.s);
-  x.V = x.A.frame.point_dot(a.s);
-  if (relative) {
-    x.X -= x.B.frame.point(b.s);
-    x.V -= x.B.frame.point_dot(b.s);
-  }
-  return x;
-}
-
-std::vector<int> PointSensor::bodies(const MechanismData&) const {
-  return {a.body, relative ? b.body : 0, std::max(axes_body, 0)};
-}
-
 SensorPtr PointSensor::rate(const MechanismData&) const {
-  if (quantity != PointSensor::Quantity::position) return nullptr;
-  return changed(*this, [](PointSensor& r) { r.quantity = PointSensor::Quantity::position_rate; });
+  if (quantity != Quantity::position) return nullptr;
+  return changed(*this, [](PointSensor& r) { r.quantity = Quantity::position_rate; });
 }
 
 std::vector<SensorPtr> PointSensor::components() const {
-  return quantity == PointSensor::Quantity::velocity ? components_of_norm(*this) : std::vector<SensorPtr>();
+  return quantity == Quantity::velocity ? components_of_norm(*this) : std::vector<SensorPtr>();
 }
 
-std::unique_ptr<SensorFunction> make_place(Compilation& model, const Sensor& s, const std::string& where) {
+std::unique_ptr<SensorFunction> make_point(Compilation& model, const Sensor& s, const std::string& where) {
+  using enum PointSensor::Quantity;
   auto out = std::make_unique<PointSensor>();
-  if (s.quantity == "velocity") out->quantity = PointSensor::Quantity::velocity;
-  set_points(model, s, *out, where);
+  out->quantity = s.quantity == "position" ? position : s.quantity == "velocity" ? velocity : acceleration;
+  out->a = sensor_point(model, s.body, s.point, where);
+  if (s.relative_to) {
+    out->relative = true;
+    out->b = sensor_point(model, s.relative_to->body, s.relative_to->point, where + ".relative_to");
+  }
+  out->component = component_of(s, where);
+  if (s.in_body_frame) out->axes_body = out->a.body;
   return out;
 }
 
@@ -204,12 +164,6 @@ std::unique_ptr<SensorFunction> make_distance(Compilation& model, const Sensor& 
   out->relative = true;
   out->a = sensor_point(model, s.body2, s.point2, where);
   out->b = sensor_point(model, s.body1.empty() ? "ground" : s.body1, s.point1, where);
-  return out;
-}
-
-std::unique_ptr<SensorFunction> make_acceleration(Compilation& model, const Sensor& s, const std::string& where) {
-  auto out = std::make_unique<AccelerationSensor>();
-  set_points(model, s, *out, where);
   return out;
 }
 

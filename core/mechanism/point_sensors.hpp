@@ -1,8 +1,10 @@
-// Position, velocity, distance and their rates of body-fixed points.
-//   X = P_a - P_b (b optional: the plain difference),  Xdot its rate,  in the axes R of a body or global (R = I)
+// Position, velocity and acceleration of body-fixed points, distances and their rates.
+//   X = P_a - P_b (b optional: the plain difference),  Xdot, Xddot,  in the axes R of a body or global (R = I)
 //   position       a component of L = R'X, or |L| (a distance)
 //   position_rate  its time derivative: a component of Ldot = Rdot'X + R'Xdot, or L'Ldot/|L|
 //   velocity       a component of R'Xdot, or |Xdot|
+//   acceleration   a component of R'Xddot, or |Xddot|, without gravity. It depends on the state and on z = (rddot,
+//                  omegadot) of the bodies, which the equations of motion give.
 #pragma once
 
 #include <string>
@@ -30,31 +32,18 @@ BodyAt moving(const StatePoint& at, int body);
 // Adds the gradient of X' times the acceleration of the point. The part in the motion goes to at.motion->bar().
 void add_acceleration(const StatePoint& at, const BodyPoint& point, const Vector3d& X, SensorGradient& to);
 
-// Sensors of points share these fields.
-struct SeenPoints {
+struct PointSensor final : SensorFunction {
+  enum class Quantity { position, velocity, acceleration, position_rate };
+  Quantity quantity = Quantity::position;
   BodyPoint a, b;
   bool relative = false;  // whether b counts
   int component = 0;      // 0..2, or kNorm
-  int axes_body = -1;     // body whose axes the components are in; -1: global
-};
-
-struct PointSensor final : SensorFunction, SeenPoints {
-  enum class Quantity { position, position_rate, velocity };
-  Quantity quantity = Quantity::position;
+  int axes_body = 0;      // body whose axes the components are in; the ground's are global
 
   double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override;
-  std::vector<int> bodies(const MechanismData&) const override;
+  std::vector<int> bodies(const MechanismData&) const override { return {a.body, b.body, axes_body}; }
   SensorPtr rate(const MechanismData&) const override;
   std::vector<SensorPtr> components() const override;
-
- private:
-  struct Seen {
-    BodyAt A, B, R;  // of the two points and of the axes
-    Vector3d X, V;
-  };
-  Seen seen(const Eigen::VectorXd& y) const;
-  double pick(const Vector3d& x) const { return component_value(x, component); }
-  Vector3d along(const Vector3d& x) const { return component_gradient(x, component); }
 };
 
 }  // namespace mbsopt

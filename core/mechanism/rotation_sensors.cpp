@@ -1,32 +1,38 @@
-// Angular velocity of a body, and its Euler parameters.
+// Angular velocity of a body.
 //   omega_B = 2 G(p) pdot,  omega_G = A omega_B = 2 (e0 edot - e0dot e + e x edot)
+//
+// An inertial measurement unit at a body point P, in axes M fixed in the body. m is one of them, in the body's axes.
+//   a  specific force     m'A'(Pddot - g)    [m/s^2]    at rest it reads +g upwards
+//   w  angular velocity   m'omega_B          [rad/s]
 #include "core/body/state_layout.hpp"
-#include "core/mechanism/sensor_gradient.hpp"
+#include "core/mechanism/point_sensors.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 
 namespace mbsopt {
 namespace {
 
+struct MountAxis {
+  Vector3d m = Vector3d::UnitX();
+  int slot = -1;
+};
+
 struct AngularVelocitySensor final : SensorFunction {
   int body = 0;
   int component = 0;           // 0..2, or kNorm
   bool in_body_frame = false;  // components in the body's axes, else global
+  bool mounted = false;        // along the axis of a mount instead
+  MountAxis axis;
 
-  Vector3d omega(const Eigen::VectorXd& y) const {
-    const BodyAt b = body_at(y, body);
-    const Vector3d e = b.state.p.tail<3>(), f = b.state.pdot.tail<3>();
-    const double sign = in_body_frame ? -1 : 1;
-    return 2 * (b.state.p(0) * f - b.state.pdot(0) * e + sign * e.cross(f));
-  }
   double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
-    const Vector3d w = omega(at.y);
-    const double result = component_value(w, component);
-    if (!to || body == 0) return result;
-    const Vector3d d = component_gradient(w, component);
     const BodyAt b = body_at(at.y, body);
     const Vector4d &p = b.state.p, &pdot = b.state.pdot;
     const Vector3d e = p.tail<3>(), f = pdot.tail<3>();
     const double sign = in_body_frame ? -1 : 1;  // of e x edot
+    const Vector3d w = 2 * (p(0) * f - pdot(0) * e + sign * e.cross(f));
+    const Vector3d d = mounted ? axis.m : component_gradient(w, component);
+    const double result = mounted ? axis.m.dot(w) : component_value(w, component);
+    if (!to || body == 0) return result;
+    to->add_slot<3>(axis.slot, w);
     Vector4d p_bar, pdot_bar;
     p_bar << d.dot(f), -pdot(0) * d + sign * f.cross(d);
     pdot_bar << -d.dot(e), p(0) * d + sign * d.cross(e);
@@ -39,18 +45,22 @@ struct AngularVelocitySensor final : SensorFunction {
   std::vector<SensorPtr> components() const override { return components_of_norm(*this); }
 };
 
-// One entry of y: an Euler parameter, or its rate.
-struct CoordinateFunction final : SensorFunction {
-  int body = 0;
-  Eigen::Index index = 0;  // in y
+struct SpecificForceSensor final : SensorFunction {
+  BodyPoint point;
+  MountAxis axis;
 
-  double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
-    if (to) to->y_bar(index) += to->scale;
-    return at.y(index);
-  }
-  std::vector<int> bodies(const MechanismData&) const override { return {body}; }
-  SensorPtr rate(const MechanismData& d) const override {
-    return changed(*this, [&](CoordinateFunction& r) { r.index += StateLayout{d.n}.positions(); });
+  double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
+    const BodyAt b = moving(at, point.body);
+    const Vector3d W = b.frame.point_ddot(point.s) - d.gravity, along = b.frame.A * axis.m;
+    if (!to) return along.dot(W);
+    FrameBar bar = FrameBar::zero();
+    bar.A = W * axis.m.transpose();
+    to->add_frame(b, point.body, bar);
+    to->add_slot<3>(axis.slot, Vec<3>(b.frame.A.transpose() * W));
+    to->add_slot<3>(d.slot_gravity, Vec<3>(-along));
+    add_acceleration(at, point, along, *to);
+    at.motion->fold_bar(at, to->y_bar, to->rho_bar);
+    return along.dot(W);
   }
 };
 
@@ -64,14 +74,23 @@ std::unique_ptr<SensorFunction> make_angular_velocity(Compilation& model, const 
   return out;
 }
 
-std::unique_ptr<SensorFunction> make_orientation(Compilation& model, const Sensor& s, const std::string& where) {
-  const int body = model.body_index(s.body, where);
-  if (body == 0 || s.component.size() != 2 || s.component[0] != 'e' || s.component[1] < '0' || s.component[1] > '3') {
-    throw SceneError(where + ": orientation needs a moving body and a component e0, e1, e2 or e3");
+std::unique_ptr<SensorFunction> make_imu(Compilation& model, const Sensor& s, const std::string& where) {
+  const std::size_t k = s.component.size() == 2 ? std::string_view("xyz").find(s.component[1]) : std::string::npos;
+  if (k == std::string::npos || (s.component[0] != 'a' && s.component[0] != 'w'))
+    throw SceneError(where + ".component: is '" + s.component + "'; allowed: ax, ay, az, wx, wy, wz");
+  MountAxis axis;
+  const FieldVector3 e = model.fields.constants(Vector3d::Unit(static_cast<Eigen::Index>(k)));
+  axis.m = numbers(model.keep(axis.slot, rotated(orientation_of(model, s.axes, where + ".axes"), e)));
+  if (s.component[0] == 'w') {
+    auto out = std::make_unique<AngularVelocitySensor>();
+    out->body = model.body_index(s.body, where + ".body");
+    out->in_body_frame = out->mounted = true;
+    out->axis = axis;
+    return out;
   }
-  auto out = std::make_unique<CoordinateFunction>();
-  out->body = body;
-  out->index = StateLayout{model.data.n}.p(body) + (s.component[1] - '0');
+  auto out = std::make_unique<SpecificForceSensor>();
+  out->point = sensor_point(model, s.body, s.point, where);
+  out->axis = axis;
   return out;
 }
 

@@ -13,28 +13,24 @@ namespace mbsopt {
 
 using SensorMaker = std::unique_ptr<SensorFunction>(Compilation& model, const Sensor& sensor, const std::string& where);
 
-SensorMaker make_place, make_distance, make_acceleration;          // point_sensors.cpp
-SensorMaker make_joint_angle, make_body_angle, make_displacement;  // joint_sensors.cpp
-SensorMaker make_angular_velocity, make_orientation;               // rotation_sensors.cpp
-SensorMaker make_energy, make_violation, make_tension;             // energy_, violation_, tension_sensor.cpp
-SensorMaker make_mass_sum;                                         // mass_sensors.cpp
-SensorMaker make_angular_momentum;                                 // angular_momentum_sensor.cpp
-SensorMaker make_reaction, make_drive_force;                       // reaction_sensor.cpp
-SensorMaker make_imu;                                              // imu_sensor.cpp
-SensorMaker make_transmission_angle;                               // transmission_sensor.cpp
-SensorMaker make_smallest_singular_value;                          // singular_value_sensor.cpp
-SensorMaker make_expression;                                       // expression_sensor.cpp
+SensorMaker make_point, make_distance;                                               // point_sensors.cpp
+SensorMaker make_joint_angle, make_body_angle, make_displacement, make_orientation;  // joint_sensors.cpp
+SensorMaker make_angular_velocity, make_imu;                                         // rotation_sensors.cpp
+SensorMaker make_mass_sum;                                                           // mass_sensors.cpp
+SensorMaker make_reaction, make_drive_force;                                         // reaction_sensor.cpp
+SensorMaker make_energy, make_violation, make_tension, make_angular_momentum;        // a file each
+SensorMaker make_transmission_angle, make_smallest_singular_value, make_expression;
 
 struct SensorMakerRow {
   std::string_view quantity;
   SensorMaker* make;
 };
 inline constexpr SensorMakerRow kSensorMakers[] = {
-    {"position", make_place},
-    {"velocity", make_place},
+    {"position", make_point},
+    {"velocity", make_point},
     {"distance", make_distance},
     {"distance_rate", make_distance},
-    {"acceleration", make_acceleration},
+    {"acceleration", make_point},
     {"angle", make_joint_angle},
     {"rate", make_joint_angle},
     {"body_angle", make_body_angle},
