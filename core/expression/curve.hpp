@@ -1,7 +1,9 @@
 // A function of one number through samples (x_i, y_i), with its derivatives:
 //   hold      y_i from x_i to x_{i+1}               jumps at samples
 //   linear    straight lines between samples        kinks at samples
-//   spline    C2 cubic, not-a-knot at both ends     (cubic_spline.hpp)
+//   spline    C2 cubic                              de Boor, "A Practical Guide to Splines" (2001), chapter IV
+// A spline is not-a-knot at both ends: its third derivative is continuous at the second and the last but one sample.
+// Two samples give a line, three a parabola.
 // A smooth routine with its derivatives is a curve, too. It counts as a spline without samples. The first and the last
 // piece continue outside the samples. At a sample, the curve takes the piece to its right.
 //
@@ -11,10 +13,7 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <vector>
-
-#include "core/expression/cubic_spline.hpp"
 
 namespace mbsopt {
 
@@ -33,8 +32,8 @@ class Curve {
 
   bool is_routine() const { return static_cast<bool>(routine_); }
   Interpolation interpolation() const { return how_; }
-  const std::vector<double>& x() const { return spline_ ? spline_->times() : x_; }
-  const std::vector<double>& y() const { return spline_ ? spline_->values() : y_; }
+  const std::vector<double>& x() const { return x_; }
+  const std::vector<double>& y() const { return y_; }
   // The value (hold), the slope (linear) or the third derivative (spline) changes by this at sample i.
   double change_at(std::size_t i) const;
 
@@ -43,8 +42,8 @@ class Curve {
 
   Interpolation how_;
   std::function<double(double, int)> routine_;
-  std::vector<double> x_, y_;          // of hold and linear
-  std::optional<CubicSpline> spline_;  // of spline
+  std::vector<double> x_, y_;
+  std::vector<double> slopes_;  // of spline, at the samples
 };
 
 }  // namespace mbsopt
