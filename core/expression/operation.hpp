@@ -12,8 +12,10 @@
 //   sqrt at 0                   infinite
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <iterator>
 #include <string_view>
 
 namespace mbsopt {
@@ -21,38 +23,37 @@ namespace mbsopt {
 enum class Operation : unsigned char {
   number,  // a constant
   name,    // a free name; in a Program: an input
-  negate,
+  // Of two operands:
   add,
   subtract,
   multiply,
   divide,
   power,
+  atan2,
+  min,
+  max,
+  smooth_abs,  // sqrt(a^2 + b^2)
+  not_above,   // 1 where a <= b, else 0: the choice of min and max; only derivative programs use it
+  // Of one operand:
+  negate,
+  abs,
+  sign,  // -1, 0 or 1: the derivative of abs; only derivative programs use it
   sin,
   cos,
   tan,
   asin,
   acos,
   atan,
-  atan2,
   sinh,
   cosh,
   tanh,
   exp,
   log,
   sqrt,
-  abs,
-  min,
-  max,
-  smooth_abs,  // sqrt(a^2 + b^2)
-  sign,        // -1, 0 or 1: the derivative of abs; only derivative programs use it
-  not_above,   // 1 where a <= b, else 0: the choice of min and max; only derivative programs use it
-  curve,       // a function through samples (curve.hpp) of a; the owner of the curve evaluates it
+  curve,  // a function through samples (curve.hpp) of a; the owner of the curve evaluates it
 };
 
-// 0 for number and name, else 1 or 2.
-int operands(Operation operation);
-
-inline double apply(Operation operation, double a, double b);
+constexpr int operands(Operation f) { return f <= Operation::name ? 0 : f <= Operation::not_above ? 2 : 1; }
 
 // Partial derivatives of f(a, b).
 template <class T>
@@ -70,8 +71,6 @@ struct FunctionEntry {
   Operation operation;  // of smooth_max: smooth_abs, since it is written with it
   int least, most;      // number of arguments; most = -1: any number
 };
-const FunctionEntry* find_function(std::string_view name);  // nullptr when there is none
-
 inline constexpr double kSmoothingDefault = 1e-6;
 
 inline constexpr FunctionEntry kFunctions[] = {
@@ -97,16 +96,22 @@ inline constexpr FunctionEntry kFunctions[] = {
     {"table", Operation::curve, 3, 3},
 };
 
-// This is inline because a Program spends its time here.
+inline const FunctionEntry* find_function(std::string_view name) {  // nullptr when there is none
+  const auto* const entry = std::ranges::find(kFunctions, name, &FunctionEntry::name);
+  return entry == std::end(kFunctions) ? nullptr : entry;
+}
 
+inline constexpr double (*kOfOne[])(double) = {  // sin and those after it
+    std::sin,  std::cos,  std::tan,  std::asin, std::acos, std::atan,
+    std::sinh, std::cosh, std::tanh, std::exp,  std::log,  std::sqrt};
+
+// This is inline because a Program spends its time here.
 inline double apply(Operation operation, double a, double b) {
   switch (operation) {
-    case Operation::number:
-    case Operation::name:
-    case Operation::curve:
-      break;
     case Operation::negate:
       return -a;
+    case Operation::abs:
+      return std::abs(a);
     case Operation::add:
       return a + b;
     case Operation::subtract:
@@ -117,34 +122,8 @@ inline double apply(Operation operation, double a, double b) {
       return a / b;
     case Operation::power:
       return std::pow(a, b);
-    case Operation::sin:
-      return std::sin(a);
-    case Operation::cos:
-      return std::cos(a);
-    case Operation::tan:
-      return std::tan(a);
-    case Operation::asin:
-      return std::asin(a);
-    case Operation::acos:
-      return std::acos(a);
-    case Operation::atan:
-      return std::atan(a);
     case Operation::atan2:
       return std::atan2(a, b);
-    case Operation::sinh:
-      return std::sinh(a);
-    case Operation::cosh:
-      return std::cosh(a);
-    case Operation::tanh:
-      return std::tanh(a);
-    case Operation::exp:
-      return std::exp(a);
-    case Operation::log:
-      return std::log(a);
-    case Operation::sqrt:
-      return std::sqrt(a);
-    case Operation::abs:
-      return std::abs(a);
     case Operation::min:
       return (a <= b || std::isnan(a)) ? a : b;  // NaN of either operand passes through
     case Operation::max:
@@ -155,9 +134,10 @@ inline double apply(Operation operation, double a, double b) {
       return a > 0 ? 1 : (a < 0 ? -1 : 0);
     case Operation::not_above:
       return a <= b ? 1 : 0;
+    default:
+      assert(operation >= Operation::sin && operation < Operation::curve);
+      return kOfOne[static_cast<int>(operation) - static_cast<int>(Operation::sin)](a);
   }
-  assert(false && "a leaf or a curve");
-  return 0;
 }
 
 // The functions of a number T that partials() needs; T::of(operation, a, b) evaluates an operation.
@@ -267,17 +247,22 @@ Partials<T> partials(Operation operation, const T& a, const T& b, const T& value
 struct Tangent : Arithmetic<Tangent> {
   double x = 0, dx = 0;
 
-  Tangent() = default;
-  Tangent(double value, double direction) : x(value), dx(direction) {}
+  explicit Tangent(double value = 0, double direction = 0) : x(value), dx(direction) {}
   static Tangent of(Operation operation, const Tangent& a, const Tangent& b) {
     const double value = apply(operation, a.x, b.x);
     const Partials<double> f = partials(operation, a.x, b.x, value);
-    return {value, calculus::seeded(a.dx, f.a) + calculus::seeded(b.dx, f.b)};
+    return Tangent(value, calculus::seeded(a.dx, f.a) + calculus::seeded(b.dx, f.b));
   }
-  friend Tangent constant(double number, const Tangent&) { return {number, 0}; }
+  Tangent& operator+=(const Tangent& a) { return *this = Tangent(x + a.x, dx + a.dx); }
+  bool operator==(const Tangent& a) const { return x == a.x && dx == a.dx; }
+  friend Tangent constant(double number, const Tangent&) { return Tangent(number); }
   friend Tangent product(const Tangent& a, const Tangent& b) {
     using calculus::product;
-    return {product(a.x, b.x), product(a.dx, b.x) + product(a.x, b.dx)};
+    return Tangent(product(a.x, b.x), product(a.dx, b.x) + product(a.x, b.dx));
+  }
+  friend Tangent seeded(const Tangent& seed, const Tangent& factor) {
+    using calculus::seeded;
+    return Tangent(seeded(seed.x, factor.x), seeded(seed.dx, factor.x) + seeded(seed.x, factor.dx));
   }
   friend Tangent quotient(const Tangent& a, const Tangent& b) { return b.x == 0 ? Tangent() : a / b; }
 };

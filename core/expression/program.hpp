@@ -11,6 +11,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -39,9 +40,13 @@ class Symbols {
   std::vector<std::string> names() const;                     // all of them, sorted
 
  private:
+  struct Meaning {
+    int input = -1;
+    std::optional<Expression> definition = {};
+  };
+  void add(const std::string& name, Meaning meaning);
   std::vector<std::string> input_names_;
-  std::unordered_map<std::string, int> index_;
-  std::unordered_map<std::string, Expression> definitions_;
+  std::unordered_map<std::string, Meaning> meanings_;
 };
 
 inline constexpr int kDeepestDefinitions = 500;  // definitions within each other: programs are built by recursion
@@ -70,7 +75,8 @@ class Program {
   // A scratch is sized once and serves every evaluation of one thread. It fits any program that is not larger than its
   // maker.
   struct Scratch {
-    std::vector<double> value, adjoint, tangent, adjoint_tangent;
+    std::vector<double> value, adjoint;
+    std::vector<Tangent> tangent, adjoint_tangent;  // of values and adjoints
   };
 
   Program() = default;                                            // the constant 0
@@ -101,10 +107,12 @@ class Program {
 
  private:
   friend class ProgramBuilder;
-  double value_of(const Instruction& in, double a, double b) const;
-  Partials<double> partials_of(const Instruction& in, double a, double b, double value) const;
-  Partials<Tangent> partials_of(const Instruction& in, Tangent a, Tangent b, Tangent value) const;
-  void sweep_values(std::span<const double> x, double* value) const;
+  // The sweeps for numbers T: double, or Tangent for the derivatives of all in one direction. inputs(i) is an input;
+  // add(i, bar) receives the derivative of scale times the result in it.
+  template <class T, class Inputs>
+  T sweep(Inputs&& inputs, std::vector<T>& value) const;
+  template <class T, class Add>
+  void sweep_back(double scale, const std::vector<T>& value, std::vector<T>& adjoint, Add&& add) const;
   std::vector<Instruction> code_;
   std::vector<int> used_inputs_;
   std::vector<CurveUse> curves_;

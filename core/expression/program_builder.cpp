@@ -44,22 +44,11 @@ void ProgramBuilder::build_derivative(const Program& of, int input) {
 }
 
 void ProgramBuilder::build_part(const Program& of, int a, Operation how, int b, double from) {
-  const std::size_t size = static_cast<std::size_t>(std::max(a, b)) + 1;
-  std::vector<char> needed(size, 0);
-  needed[static_cast<std::size_t>(a)] = 1;
-  if (b >= 0) needed[static_cast<std::size_t>(b)] = 1;
-  for (std::size_t i = size; i-- > 0;) {
+  std::vector<int> at(static_cast<std::size_t>(std::max(a, b)) + 1, -1);
+  const auto operand = [&](int k) { return k < 0 ? -1 : at[static_cast<std::size_t>(k)]; };
+  for (std::size_t i = 0; i < at.size(); ++i) {
     const Instruction& in = of.code_[i];
-    if (!needed[i] || operands(in.operation) == 0) continue;
-    needed[static_cast<std::size_t>(in.a)] = 1;
-    if (in.b >= 0) needed[static_cast<std::size_t>(in.b)] = 1;
-  }
-  std::vector<int> at(size, -1);
-  for (std::size_t i = 0; i < size; ++i) {
-    if (!needed[i]) continue;
-    const Instruction& in = of.code_[i];
-    const auto operand = [&](int k) { return k < 0 ? -1 : at[static_cast<std::size_t>(k)]; };
-    at[i] = operands(in.operation) == 0 ? copied(of, in, -1, -1) : copied(of, in, operand(in.a), operand(in.b));
+    at[i] = in.operation == Operation::name ? copied(of, in, -1, -1) : copied(of, in, operand(in.a), operand(in.b));
   }
   const int first = at[static_cast<std::size_t>(a)];
   keep_only_what_reaches(how == Operation::cos        ? operation(how, first, -1)
