@@ -28,57 +28,44 @@ std::vector<double> corners(const Program::CurveUse& use) {
 
 }  // namespace
 
+namespace {
+
+// An operation changes where an operand, its cosine (cos) or the difference of both (subtract) is zero.
+struct Change {
+  Operation operation, how;
+  int Program::Instruction::*operand;
+  bool jumps;  // else only its slope changes
+};
+constexpr auto kA = &Program::Instruction::a, kB = &Program::Instruction::b;
+constexpr Change kChanges[] = {
+    {Operation::divide, Operation::name, kB, true},   {Operation::atan2, Operation::name, kA, true},
+    {Operation::atan2, Operation::name, kB, true},    {Operation::tan, Operation::cos, kA, true},
+    {Operation::sign, Operation::name, kA, true},     {Operation::not_above, Operation::subtract, kA, true},
+    {Operation::abs, Operation::name, kA, false},     {Operation::smooth_abs, Operation::name, kA, false},
+    {Operation::tanh, Operation::name, kA, false},    {Operation::atan, Operation::name, kA, false},
+    {Operation::min, Operation::subtract, kA, false}, {Operation::max, Operation::subtract, kA, false}};
+
+}  // namespace
+
 std::vector<Program> switches_of(const Program& program) {
   using Switches = std::set<std::tuple<Operation, int, int, double>>;
-  Switches all, choices;  // choices: where nothing but a denominator changes
+  Switches all, choices;  // choices: a denominator may touch zero there, as of x/abs(x) and x/sqrt(x^2)
   bool may_jump = false;
   for (const Program::Instruction& in : program.code()) {
-    const auto kink = [&](Operation how, int a, int b = -1) { all.insert({how, a, b, 0}); };
-    const auto choice = [&](Operation how, int a) { choices.insert({how, a, -1, 0}); };
-    const auto jump = [&](Operation how, int a, int b = -1) { may_jump = true, kink(how, a, b); };
-    switch (in.operation) {
-      case Operation::divide:
-        jump(Operation::name, in.b);
-        break;
-      case Operation::power: {
-        const Program::Instruction& exponent = program.code()[static_cast<std::size_t>(in.b)];
-        const bool continuous = exponent.operation == Operation::number && exponent.constant >= 0;
-        continuous ? choice(Operation::name, in.a) : jump(Operation::name, in.a);
-        break;
-      }
-      case Operation::atan2:
-        jump(Operation::name, in.a);
-        jump(Operation::name, in.b);
-        break;
-      case Operation::tan:
-        jump(Operation::cos, in.a);
-        break;
-      case Operation::sign:
-        jump(Operation::name, in.a);
-        break;
-      case Operation::not_above:
-        jump(Operation::subtract, in.a, in.b);
-        break;
-      case Operation::abs:
-      case Operation::smooth_abs:
-      case Operation::tanh:
-      case Operation::atan:
-        kink(Operation::name, in.a);
-        break;
-      case Operation::min:
-      case Operation::max:
-        kink(Operation::subtract, in.a, in.b);
-        break;
-      case Operation::curve:
-        for (const double x : corners(program.curve_of(in))) all.insert({Operation::number, in.a, -1, x});
-        break;
-      // A denominator may touch zero at these choices: x/abs(x), x/sqrt(x^2).
-      case Operation::multiply:
-        if (in.a == in.b) choice(Operation::name, in.a);
-        break;
-      default:
-        break;
+    for (const Change& change : kChanges) {
+      if (change.operation != in.operation) continue;
+      all.insert({change.how, in.*change.operand, change.how == Operation::subtract ? in.b : -1, 0});
+      may_jump = may_jump || change.jumps;
     }
+    if (in.operation == Operation::power) {
+      const Program::Instruction& exponent = program.code()[static_cast<std::size_t>(in.b)];
+      const bool continuous = exponent.operation == Operation::number && exponent.constant >= 0;
+      (continuous ? choices : all).insert({Operation::name, in.a, -1, 0});
+      may_jump = may_jump || !continuous;
+    }
+    if (in.operation == Operation::multiply && in.a == in.b) choices.insert({Operation::name, in.a, -1, 0});
+    if (in.operation == Operation::curve)
+      for (const double x : corners(program.curve_of(in))) all.insert({Operation::number, in.a, -1, x});
   }
   std::vector<Program> found;
   if (may_jump) all.merge(choices);
