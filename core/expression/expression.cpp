@@ -18,14 +18,6 @@ std::string shortest(double value) {
   return {buffer, end};
 }
 
-SyntaxTree tree_of(double value) {
-  SyntaxTree tree;
-  tree.nodes.emplace_back().value = value;
-  tree.text = shortest(value);
-  tree.number = value;
-  return tree;
-}
-
 // Appends the nodes of an expression, and returns the index of its last node.
 int append(SyntaxTree& tree, const Expression& expression) {
   const int shift = static_cast<int>(tree.nodes.size());
@@ -39,66 +31,39 @@ int append(SyntaxTree& tree, const Expression& expression) {
 
 }  // namespace
 
-// Builds an expression from others.
-struct ExpressionMaker {
-  static Expression of(SyntaxTree tree) {
-    complete(tree);
-    Expression result;
-    result.tree_ = std::make_shared<const SyntaxTree>(std::move(tree));
-    return result;
-  }
-  static Expression of(Operation operation, char sign, const Expression& a, const Expression& b) {
-    SyntaxTree tree;
-    SyntaxNode node;
-    node.operation = operation;
-    node.a = append(tree, a);
-    node.b = append(tree, b);
-    tree.nodes.push_back(std::move(node));
-    tree.text = "(" + a.text() + ") " + sign + " (" + b.text() + ")";
-    return of(std::move(tree));
-  }
-};
+Expression::Expression(SyntaxTree tree) {
+  complete(tree);
+  tree_ = std::make_shared<const SyntaxTree>(std::move(tree));
+}
 
-Expression operator+(const Expression& a, const Expression& b) {
-  return ExpressionMaker::of(Operation::add, '+', a, b);
-}
-Expression operator-(const Expression& a, const Expression& b) {
-  return ExpressionMaker::of(Operation::subtract, '-', a, b);
-}
-Expression operator*(const Expression& a, const Expression& b) {
-  return ExpressionMaker::of(Operation::multiply, '*', a, b);
-}
+Expression::Expression(double value) : Expression(SyntaxTree{{{.value = value}}, shortest(value)}) {}
+
+Expression Expression::parse(std::string_view text) { return Expression({parse_expression(text), std::string(text)}); }
 
 Expression Expression::of_curve(std::shared_ptr<const Curve> f, const Expression& argument, std::string_view name) {
   SyntaxTree tree;
-  SyntaxNode node;
-  node.operation = Operation::curve;
-  node.curve = std::move(f);
-  node.a = append(tree, argument);
-  tree.nodes.push_back(std::move(node));
+  const int a = append(tree, argument);
+  tree.nodes.push_back({.operation = Operation::curve, .a = a, .curve = std::move(f)});
   tree.text = std::string(name) + "(" + argument.text() + ")";
-  return ExpressionMaker::of(std::move(tree));
+  return Expression(std::move(tree));
 }
 
-std::vector<CurveCall> curve_calls(const Expression& expression) {
-  std::vector<CurveCall> calls;
-  for (const SyntaxNode& node : expression.tree().nodes) {
-    if (!node.curve) continue;
-    SyntaxTree argument;
-    argument.nodes.assign(expression.tree().nodes.begin(), expression.tree().nodes.begin() + node.a + 1);
-    argument.text = expression.text();
-    calls.push_back({node.curve, ExpressionMaker::of(std::move(argument))});
+// Joins two expressions.
+struct Operator {
+  Operation operation;
+  char sign;
+  Expression operator()(const Expression& left, const Expression& right) const {
+    SyntaxTree tree;
+    const int a = append(tree, left), b = append(tree, right);
+    tree.nodes.push_back({.operation = operation, .a = a, .b = b});
+    tree.text = "(" + left.text() + ") " + sign + " (" + right.text() + ")";
+    return Expression(std::move(tree));
   }
-  return calls;
-}
+};
 
-Expression::Expression(double value) : tree_(std::make_shared<const SyntaxTree>(tree_of(value))) {}
-
-Expression Expression::parse(std::string_view text) {
-  Expression expression;
-  expression.tree_ = std::make_shared<const SyntaxTree>(parse_expression(text));
-  return expression;
-}
+Expression operator+(const Expression& a, const Expression& b) { return Operator{Operation::add, '+'}(a, b); }
+Expression operator-(const Expression& a, const Expression& b) { return Operator{Operation::subtract, '-'}(a, b); }
+Expression operator*(const Expression& a, const Expression& b) { return Operator{Operation::multiply, '*'}(a, b); }
 
 bool Expression::is_number() const { return tree_->number.has_value(); }
 

@@ -42,16 +42,10 @@ class Expression {
   const SyntaxTree& tree() const { return *tree_; }
 
  private:
-  friend struct ExpressionMaker;  // expression.cpp
+  friend struct Operator;                // expression.cpp
+  explicit Expression(SyntaxTree tree);  // of nodes and text
   std::shared_ptr<const SyntaxTree> tree_;
 };
-
-// The functions of one number that an expression calls, and their arguments.
-struct CurveCall {
-  std::shared_ptr<const Curve> curve;
-  Expression argument;
-};
-std::vector<CurveCall> curve_calls(const Expression& expression);
 
 Expression operator+(const Expression& a, const Expression& b);
 Expression operator-(const Expression& a, const Expression& b);

@@ -125,8 +125,7 @@ class Parser {
 
   int number() {
     const std::size_t offset = at_;
-    SyntaxNode node;
-    node.offset = offset;
+    SyntaxNode node{.offset = offset};
     const char* const first = text_.data() + at_;
     const auto [last, error] = std::from_chars(first, text_.data() + text_.size(), node.value);
     if (error == std::errc::invalid_argument) fail("expected a number, found " + found(), offset);
@@ -138,8 +137,7 @@ class Parser {
       fail("expected an operator after the number " + std::string(literal) + ", found " + found() + brackets(), at_);
     skip_space();
     if (peek() == '[') unit(node);
-    nodes_.push_back(std::move(node));
-    return last_node();
+    return push(std::move(node));
   }
 
   void unit(SyntaxNode& node) {
@@ -165,18 +163,9 @@ class Parser {
     if (peek() == '(') return call(name, offset);
     if (peek() == '[') fail("a unit may follow a number only, not the name '" + name + "'", at_);
     if (find_function(name)) fail("'" + name + "' is a function and needs arguments: " + name + "(...)", offset);
-    SyntaxNode node;
-    node.offset = offset;
-    if (name == "pi") {
-      node.value = std::numbers::pi;
-      node.unit = Dimension{};
-    } else {
-      if (is_not_finite_literal(name)) fail("'" + name + "' is not a finite number", offset);
-      node.operation = Operation::name;
-      node.name = name;
-    }
-    nodes_.push_back(std::move(node));
-    return last_node();
+    if (name == "pi") return push({.value = std::numbers::pi, .unit = Dimension{}, .offset = offset});
+    if (is_not_finite_literal(name)) fail("'" + name + "' is not a finite number", offset);
+    return push({.operation = Operation::name, .name = name, .offset = offset});
   }
 
   int call(const std::string& name, std::size_t offset) {
@@ -219,12 +208,9 @@ class Parser {
     next(',');
     const std::size_t before = nodes_.size(), abscissae_at = at_;
     const std::vector<int> abscissae = list(next);
-    for (std::size_t i = before; i < nodes_.size(); ++i)
-      if (nodes_[i].operation == Operation::name)
-        fail("'" + nodes_[i].name + "' is a name; the abscissae of '" + name + "' must be numbers", nodes_[i].offset);
-    const std::vector<double> value = values_of(nodes_);
-    std::vector<double> at;
-    for (const int i : abscissae) at.push_back(value[static_cast<std::size_t>(i)]);
+    if (const SyntaxNode* const node = first_name_from(before))
+      fail("'" + node->name + "' is a name; the abscissae of '" + name + "' must be numbers", node->offset);
+    const std::vector<double> at = values_at(abscissae);
     next(',');
     const std::size_t ordinates_at = at_, first_ordinate = nodes_.size();
     const std::vector<int> ordinates = list(next);
@@ -235,25 +221,14 @@ class Parser {
            ordinates_at);
     const Interpolation how = name == "table" ? Interpolation::linear : Interpolation::spline;
     const auto through = [&](std::vector<double> y) {
-      SyntaxNode node;
-      node.operation = Operation::curve;
-      node.a = x;
-      node.offset = offset;
       try {
-        node.curve = std::make_shared<const Curve>(how, at, std::move(y));
+        const auto f = std::make_shared<const Curve>(how, at, std::move(y));
+        return push({.operation = Operation::curve, .a = x, .curve = f, .offset = offset});
       } catch (const std::invalid_argument& error) {
         fail("'" + name + "': " + error.what(), abscissae_at);
       }
-      nodes_.push_back(std::move(node));
-      return last_node();
     };
-    const auto is_name = [](const SyntaxNode& node) { return node.operation == Operation::name; };
-    if (std::none_of(nodes_.begin() + static_cast<std::ptrdiff_t>(first_ordinate), nodes_.end(), is_name)) {
-      std::vector<double> y;
-      const std::vector<double> all = values_of(std::span<const SyntaxNode>(nodes_));
-      for (const int i : ordinates) y.push_back(all[static_cast<std::size_t>(i)]);
-      return through(std::move(y));
-    }
+    if (!first_name_from(first_ordinate)) return through(values_at(ordinates));
     if (at.size() > kMostOrdinates)
       fail("'" + name + "' has " + std::to_string(at.size()) + " ordinates that are not all numbers; at most " +
                std::to_string(kMostOrdinates) + " are allowed",
@@ -266,6 +241,19 @@ class Parser {
       total = total < 0 ? term : push(Operation::add, total, term, offset);
     }
     return total;
+  }
+
+  const SyntaxNode* first_name_from(std::size_t begin) const {
+    const auto found = std::find_if(nodes_.begin() + static_cast<std::ptrdiff_t>(begin), nodes_.end(),
+                                    [](const SyntaxNode& node) { return node.operation == Operation::name; });
+    return found == nodes_.end() ? nullptr : &*found;
+  }
+
+  std::vector<double> values_at(const std::vector<int>& places) const {
+    const std::vector<double> all = values_of(nodes_);
+    std::vector<double> values;
+    for (const int i : places) values.push_back(all[static_cast<std::size_t>(i)]);
+    return values;
   }
 
   std::vector<int> list(const auto& next) {
@@ -282,22 +270,19 @@ class Parser {
 
   // Writes functions that have more or fewer arguments than an operation in terms of operations.
   int lower(const FunctionEntry& function, const std::vector<int>& arguments, std::size_t offset) {
+    const auto smoothing = [&] { return push({.value = kSmoothingDefault, .offset = offset}); };
     if (function.name == "smooth_max") {
       const int a = arguments[0], b = arguments[1];
-      const int eps = arguments.size() > 2 ? arguments[2] : constant(kSmoothingDefault, offset);
+      const int eps = arguments.size() > 2 ? arguments[2] : smoothing();
       const int sum = push(Operation::add, a, b, offset);
       const int difference = push(Operation::subtract, a, b, offset);
       const int distance = push(Operation::smooth_abs, difference, eps, offset);
       const int total = push(Operation::add, sum, distance, offset);
-      const int two = constant(2, offset);
-      nodes_.back().unit = Dimension{};
+      const int two = push({.value = 2, .unit = Dimension{}, .offset = offset});
       return push(Operation::divide, total, two, offset);
     }
-    if (function.name == "smooth_abs" && arguments.size() == 1) {
-      const int eps = constant(kSmoothingDefault, offset);
-      return push(function.operation, arguments[0], eps, offset);
-    }
-    if (arguments.size() == 1) return push(function.operation, arguments[0], -1, offset);
+    if (arguments.size() == 1)
+      return push(function.operation, arguments[0], function.name == "smooth_abs" ? smoothing() : -1, offset);
     int all = arguments[0];
     for (std::size_t i = 1; i < arguments.size(); ++i) all = push(function.operation, all, arguments[i], offset);
     return all;
@@ -321,23 +306,13 @@ class Parser {
            known_units() + ", such as N/mm, kg m^2, N s/m or 1/(m s)";
   }
 
+  int push(SyntaxNode node) {
+    nodes_.push_back(std::move(node));
+    return static_cast<int>(nodes_.size()) - 1;
+  }
   int push(Operation operation, int a, int b, std::size_t offset) {
-    SyntaxNode node;
-    node.operation = operation;
-    node.a = a;
-    node.b = b;
-    node.offset = offset;
-    nodes_.push_back(std::move(node));
-    return last_node();
+    return push({.operation = operation, .a = a, .b = b, .offset = offset});
   }
-  int constant(double value, std::size_t offset) {
-    SyntaxNode node;
-    node.value = value;
-    node.offset = offset;
-    nodes_.push_back(std::move(node));
-    return last_node();
-  }
-  int last_node() const { return static_cast<int>(nodes_.size()) - 1; }
 
   bool at_end() const { return at_ >= text_.size(); }
   char peek() const { return at_end() ? '\0' : text_[at_]; }
@@ -407,12 +382,6 @@ void complete(SyntaxTree& tree) {
   if (tree.names.empty()) tree.number = values_of(tree.nodes).back();
 }
 
-SyntaxTree parse_expression(std::string_view text) {
-  SyntaxTree tree;
-  tree.nodes = Parser(text).run();
-  tree.text = std::string(text);
-  complete(tree);
-  return tree;
-}
+std::vector<SyntaxNode> parse_expression(std::string_view text) { return Parser(text).run(); }
 
 }  // namespace mbsopt

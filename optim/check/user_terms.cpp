@@ -9,7 +9,8 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/expression/curve.hpp"
-#include "core/expression/expression.hpp"
+#include "core/expression/program_switches.hpp"
+#include "core/expression/syntax_tree.hpp"
 #include "core/force/bound_force.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/simulate/simulation.hpp"
@@ -224,19 +225,19 @@ class UserTerms {
 
   // Checks the derivatives, up to the third, of functions written in C++ that the law calls. Gradients read these.
   void check_law(const Drive& drive, double t) {
-    for (const CurveCall& call : curve_calls(drive.law)) {
-      if (!call.curve->is_routine()) continue;
-      const Program argument(call.argument, time_symbols(scene_));
-      std::vector<double> inputs(rho_.begin(), rho_.end());
-      inputs.push_back(t);
+    std::vector<double> inputs(rho_.begin(), rho_.end());
+    inputs.push_back(t);
+    for (const auto& [use, argument] : sampled_functions_of(Program(drive.law, time_symbols(scene_)))) {
+      const Curve& f = *use.curve;
+      if (!f.is_routine()) continue;
       Program::Scratch scratch = argument.scratch();
       const double x = argument.value(inputs, scratch);
       for (int order = 1; order <= 3; ++order)
         compare(
             fmt::format("drive '{}': derivative {} of its law's function", drive.name, order), "its argument", t,
             kLargest * std::max(1.0, std::abs(x)),
-            [&](double h) { return VectorXd::Constant(1, call.curve->at(x + h, order - 1)); },
-            VectorXd::Constant(1, call.curve->at(x, order)));
+            [&](double h) { return VectorXd::Constant(1, f.at(x + h, order - 1)); },
+            VectorXd::Constant(1, f.at(x, order)));
     }
   }
 
@@ -281,7 +282,8 @@ std::vector<std::string> wrong_user_terms(const Scene& scene, const std::vector<
                                           const std::vector<std::shared_ptr<const UserForce>>& user_forces,
                                           const std::function<bool(double t)>& progress) {
   const auto calls_routine = [](const Drive& drive) {
-    return std::ranges::any_of(curve_calls(drive.law), [](const CurveCall& call) { return call.curve->is_routine(); });
+    return std::ranges::any_of(drive.law.tree().nodes,
+                               [](const SyntaxNode& n) { return n.curve && n.curve->is_routine(); });
   };
   const auto is_named = [](const Force& force) { return std::holds_alternative<UserForceSpec>(force.kind); };
   if (user_forces.empty() && std::ranges::none_of(objectives, &Objective::is_written_in_cpp) &&
