@@ -201,7 +201,7 @@ Bushing::Coordinates Bushing::coordinates(const Frame& f1, const Frame& f2) cons
 }
 
 void Bushing::spread(const Coordinates& x, const CoordinateBars& bars, const Frame& f1, const Frame& f2, FrameBar& bar1,
-                     FrameBar& bar2, SlotBars& slots) const {
+                     FrameBar& bar2, auto&& fields) const {
   // d = A1'D, ddot = A1dot'D + A1'Ddot, d_eta = A1_eta'D + A1'D_eta
   const Vector3d D = f1.A * bars.d + f1.Adot * bars.ddot + f1.A_eta * bars.d_eta, Ddot = f1.A * bars.ddot,
                  D_eta = f1.A * bars.d_eta;
@@ -209,8 +209,11 @@ void Bushing::spread(const Coordinates& x, const CoordinateBars& bars, const Fra
   bar1.Adot += x.D * bars.ddot.transpose();
   bar1.A_eta += x.D * bars.d_eta.transpose();
   const VectorJet D_bar{{D, Ddot, Vector3d::Zero()}, D_eta};
-  add_point_bar(f2, s2, D_bar, 1, bar2, slots.s2);
-  add_point_bar(f1, s1, D_bar, -1, bar1, slots.s1);
+  Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
+  add_point_bar(f2, s2, D_bar, 1, bar2, s2_bar);
+  add_point_bar(f1, s1, D_bar, -1, bar1, s1_bar);
+  fields.template add<3>(slot1, s1_bar);
+  fields.template add<3>(slot2, s2_bar);
 
   // theta = g a, thetadot = g' c_dot a + g a_dot, theta_eta = g' c_eta a + g a_eta
   const Vector3d a_bar = x.g * bars.theta + x.g1 * (x.c_dot * bars.thetadot + x.c_eta * bars.theta_eta);
@@ -224,7 +227,9 @@ void Bushing::spread(const Coordinates& x, const CoordinateBars& bars, const Fra
   // R = M R0', M = A1'A2, and so on
   const Matrix3d M = R * R0, Mdot = Rdot * R0, M_eta = R_eta * R0;
   const Matrix3d R0_bar = R.transpose() * x.M + Rdot.transpose() * x.Mdot + R_eta.transpose() * x.M_eta;
-  for (int i = 0; i < 3; ++i) slots.R0.segment<3>(3 * i) += R0_bar.row(i).transpose();
+  Vec<9> rows;
+  for (int i = 0; i < 3; ++i) rows.segment<3>(3 * i) = R0_bar.row(i).transpose();
+  fields.template add<9>(slot_R0, rows);
   bar1.A += f2.A * M.transpose() + f2.Adot * Mdot.transpose() + f2.A_eta * M_eta.transpose();
   bar1.Adot += f2.A * Mdot.transpose();
   bar1.A_eta += f2.A * M_eta.transpose();
@@ -243,17 +248,12 @@ void Bushing::pull_back(const ForceInputs&, const Frame& f1, const Frame& f2, Fr
   bars.theta = -Kt.cwiseProduct(x.theta_eta);
   bars.thetadot = -Ct.cwiseProduct(x.theta_eta);
   bars.theta_eta = -(Kt.cwiseProduct(x.theta) + Ct.cwiseProduct(x.thetadot));
-  SlotBars slots;
-  spread(x, bars, f1, f2, bar1, bar2, slots);
-  if (slot1 >= 0) theta_bar.segment<3>(slot1) += slots.s1;
-  if (slot2 >= 0) theta_bar.segment<3>(slot2) += slots.s2;
-  if (slot_R0 >= 0) theta_bar.segment<9>(slot_R0) += slots.R0;
-  if (slot_law >= 0) {
-    theta_bar.segment<3>(slot_law) -= x.d_eta.cwiseProduct(x.d);
-    theta_bar.segment<3>(slot_law + 3) -= x.d_eta.cwiseProduct(x.ddot);
-    theta_bar.segment<3>(slot_law + 6) -= x.theta_eta.cwiseProduct(x.theta);
-    theta_bar.segment<3>(slot_law + 9) -= x.theta_eta.cwiseProduct(x.thetadot);
-  }
+  ThetaGradient fields{theta_bar};
+  spread(x, bars, f1, f2, bar1, bar2, fields);
+  Vec<12> law;
+  law << x.d_eta.cwiseProduct(x.d), x.d_eta.cwiseProduct(x.ddot), x.theta_eta.cwiseProduct(x.theta),
+      x.theta_eta.cwiseProduct(x.thetadot);
+  fields.add<12>(slot_law, -law);
 }
 
 double Bushing::potential(const Eigen::VectorXd&, const Frame& f1, const Frame& f2) const {
@@ -267,14 +267,10 @@ void Bushing::pull_back_potential(const Eigen::VectorXd&, const Frame& f1, const
   CoordinateBars bars;
   bars.d = K.cwiseProduct(x.d);
   bars.theta = Kt.cwiseProduct(x.theta);
-  SlotBars slots;
-  spread(x, bars, f1, f2, bar1, bar2, slots);
+  spread(x, bars, f1, f2, bar1, bar2, fields);
   Vec<12> law = Vec<12>::Zero();
   law.head<3>() = 0.5 * x.d.cwiseAbs2();
   law.segment<3>(6) = 0.5 * x.theta.cwiseAbs2();
-  fields.add<3>(slot1, slots.s1);
-  fields.add<3>(slot2, slots.s2);
-  fields.add<9>(slot_R0, slots.R0);
   fields.add<12>(slot_law, law);
 }
 

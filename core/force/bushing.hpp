@@ -64,14 +64,10 @@ struct Bushing {
  private:
   struct Coordinates;
   struct CoordinateBars;
-  // Gradient of a scalar in the geometry.
-  struct SlotBars {
-    Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();
-    Vec<9> R0 = Vec<9>::Zero();
-  };
   Coordinates coordinates(const Frame& f1, const Frame& f2) const;
+  // Adds the gradient of a scalar, given that in the coordinates. `fields` is a ThetaGradient or a FieldGradient.
   void spread(const Coordinates& x, const CoordinateBars& bars, const Frame& f1, const Frame& f2, FrameBar& bar1,
-              FrameBar& bar2, SlotBars& slots) const;
+              FrameBar& bar2, auto&& fields) const;
 };
 
 }  // namespace mbsopt

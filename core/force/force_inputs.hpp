@@ -25,6 +25,17 @@ struct ForceInputs {
   Law::Scratch& scratch;
 };
 
+// The gradient in all fields, to which rows of a field are added.
+struct ThetaGradient {
+  Eigen::VectorXd& theta_bar;
+
+  template <int N>
+  void add(int slot, const Vec<N>& bar) {
+    if (slot >= 0) theta_bar.segment<N>(slot) += bar;
+  }
+};
+
+// The same in the parameters, through the fields.
 struct FieldGradient {
   const Eigen::MatrixXd& theta_rho;  // of all fields in the active parameters
   const std::vector<int>& active;

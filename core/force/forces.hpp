@@ -14,11 +14,18 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/constraint/dot2.hpp"
 #include "core/force/bushing.hpp"
 #include "core/force/friction.hpp"
+#include "core/force/joint_effort.hpp"
 #include "core/force/tsda.hpp"
 
 namespace mbsopt {
+
+extern template struct JointEffort<Angle, FrictionLaw>;
+extern template struct JointEffort<Dot2, FrictionLaw>;
+using TurningFriction = JointEffort<Angle, FrictionLaw>;
+using SlidingFriction = JointEffort<Dot2, FrictionLaw>;
 
 template <class Kind>
 concept HasLaw = std::same_as<decltype(Kind::law), Law>;

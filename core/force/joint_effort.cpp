@@ -1,21 +1,26 @@
 #include "core/force/joint_effort.hpp"
 
 #include "core/constraint/dot2.hpp"
-#include "core/force/friction_law.hpp"
+#include "core/force/friction.hpp"
 
 namespace mbsopt {
+
+// Adds the gradient of lambda x_eta + x_bar x + xdot_bar xdot in the frames and in the measure's fields.
+template <class P>
+static void add_pull_back(const JointMeasure<P>& joint, double lambda, double x_bar, double xdot_bar, const Frame& f1,
+                          const Frame& f2, FrameBar& bar1, FrameBar& bar2, auto&& fields) {
+  const Multipliers<1> z{Vec<1>(lambda), Vec<1>(x_bar), Vec<1>(xdot_bar), Vec<1>(0)};
+  GeometryBar s;
+  joint.measure.pull_back(f1, f2, z, bar1, bar2, s);
+  fields.template add<3>(joint.slot1, s.s1);
+  fields.template add<3>(joint.slot2, s.s2);
+  fields.template add<3>(joint.slot3, s.s3);
+}
 
 template <class P, class L>
 void JointEffort<P, L>::pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar,
                                            FrameBar& bar1, FrameBar& bar2, FieldGradient& fields) const {
-  Multipliers<1> z = Multipliers<1>::zero();
-  z.mu0(0) = x_bar;
-  z.mu1(0) = xdot_bar;
-  GeometryBar s;
-  joint.measure.pull_back(f1, f2, z, bar1, bar2, s);
-  fields.add<3>(joint.slot1, s.s1);
-  fields.add<3>(joint.slot2, s.s2);
-  fields.add<3>(joint.slot3, s.s3);
+  add_pull_back(joint, 0, x_bar, xdot_bar, f1, f2, bar1, bar2, fields);
 }
 
 template <class P, class L>
@@ -36,15 +41,7 @@ void JointEffort<P, L>::pull_back(const ForceInputs& in, const Frame& f1, const 
   const double change = virtual_change(joint.measure, f1, f2)(0);
   const Law::Value f = law.derivatives(in.t, in.rho, x, xdot, in.scratch);
   law.add_field_gradient(x, xdot, -change, in.scratch, theta_bar, rho_bar);
-  Multipliers<1> z = Multipliers<1>::zero();
-  z.lambda(0) = -f.f;
-  z.mu0(0) = -change * f.f_x;
-  z.mu1(0) = -change * f.f_xdot;
-  GeometryBar s;
-  joint.measure.pull_back(f1, f2, z, bar1, bar2, s);
-  if (joint.slot1 >= 0) theta_bar.segment<3>(joint.slot1) += s.s1;
-  if (joint.slot2 >= 0) theta_bar.segment<3>(joint.slot2) += s.s2;
-  if (joint.slot3 >= 0) theta_bar.segment<3>(joint.slot3) += s.s3;
+  add_pull_back(joint, -f.f, -change * f.f_x, -change * f.f_xdot, f1, f2, bar1, bar2, ThetaGradient{theta_bar});
 }
 
 template <class P, class L>

@@ -15,6 +15,16 @@ Law::Point TsdaForce::measured(const Eigen::VectorXd&, const Frame& f1, const Fr
   return {x.l, x.ldot};
 }
 
+// Adds the gradient of a scalar, given that in the separation.
+void TsdaForce::add_point_bars(const MovedJet<Vector3d>& bar, const Frame& f1, const Frame& f2, FrameBar& bar1,
+                               FrameBar& bar2, auto&& fields) const {
+  Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
+  add_point_bar(f2, s2, bar, 1, bar2, s2_bar);
+  add_point_bar(f1, s1, bar, -1, bar1, s1_bar);
+  fields.template add<3>(slot1, s1_bar);
+  fields.template add<3>(slot2, s2_bar);
+}
+
 void TsdaForce::pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar, FrameBar& bar1,
                                    FrameBar& bar2, FieldGradient& fields) const {
   const SpringSpan<Vector3d> x = span(f1, f2);
@@ -22,12 +32,7 @@ void TsdaForce::pull_back_measured(const Frame& f1, const Frame& f2, double x_ba
   const Vector3d ddot_bar = xdot_bar * x.u;
   Vector3d d_bar = x_bar * x.u;
   if (x.l > 0) d_bar += xdot_bar * (x.ddot - x.ldot * x.u) / x.l;
-  const VectorJet bar{{d_bar, ddot_bar, Vector3d::Zero()}, Vector3d::Zero()};
-  Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
-  add_point_bar(f1, s1, bar, -1, bar1, s1_bar);
-  add_point_bar(f2, s2, bar, 1, bar2, s2_bar);
-  fields.add<3>(slot1, s1_bar);
-  fields.add<3>(slot2, s2_bar);
+  add_point_bars({{d_bar, ddot_bar, Vector3d::Zero()}, Vector3d::Zero()}, f1, f2, bar1, bar2, fields);
 }
 
 void TsdaForce::add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const {
@@ -42,12 +47,7 @@ void TsdaForce::pull_back(const ForceInputs& in, const Frame& f1, const Frame& f
   const SpringSpan<Vector3d> x = span(f1, f2);
   const Vector3d d_eta = f2.point_eta(s2) - f1.point_eta(s1);
   const std::optional<VectorJet> bar = work_bar(in.t, in.rho, x, d_eta, in.scratch, theta_bar, rho_bar);
-  if (!bar) return;
-  Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
-  add_point_bar(f2, s2, *bar, 1, bar2, s2_bar);
-  add_point_bar(f1, s1, *bar, -1, bar1, s1_bar);
-  if (slot1 >= 0) theta_bar.segment<3>(slot1) += s1_bar;
-  if (slot2 >= 0) theta_bar.segment<3>(slot2) += s2_bar;
+  if (bar) add_point_bars(*bar, f1, f2, bar1, bar2, ThetaGradient{theta_bar});
 }
 
 Law::Value TsdaForce::at(const ForceInputs& in, const Frame& f1, const Frame& f2) const {

@@ -84,6 +84,10 @@ struct TsdaForce {
                            FrameBar& bar2, FieldGradient& fields) const;
   bool conserves_energy() const { return law.conserves_energy(); }
   double natural_energy(const Frame& f1, const Frame& f2) const;
+
+ private:
+  void add_point_bars(const MovedJet<Vector3d>& bar, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
+                      auto&& fields) const;
 };
 
 }  // namespace mbsopt

@@ -6,7 +6,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/force/force_inputs.hpp"
-#include "core/force/friction.hpp"
+#include "core/force/forces.hpp"
 #include "tests/core/body/textbook_body.hpp"
 
 namespace mbsopt::testing {

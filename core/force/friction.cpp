@@ -1,4 +1,4 @@
-#include "core/force/friction_law.hpp"
+#include "core/force/friction.hpp"
 
 #include <cmath>
 
