@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/force/named_throw.hpp"
 #include "core/force/user_force.hpp"
 #include "core/scene/scene.hpp"
 
@@ -33,21 +34,46 @@ class BoundForce final : public UserForce, public InertialLoad {
   const std::string& name() const { return name_; }
   const InertialLoad* inertia() const override { return force_->inertia() ? this : nullptr; }
   std::vector<std::string> bodies() const override { return bodies_; }
-  void Q(double t, VecIn q, VecIn v, VecIn rho, VecOut Q) const override;
-  void K(double t, VecIn q, VecIn v, VecIn rho, MatOut K) const override;
-  void C(double t, VecIn q, VecIn v, VecIn rho, MatOut C) const override;
-  void Q_rho(double t, VecIn q, VecIn v, VecIn rho, MatOut Q_rho) const override;
+  void Q(double t, VecIn q, VecIn v, VecIn rho, VecOut Q) const override {
+    named_throw(name_, [&] { force_->Q(t, q, v, own(rho), Q); });
+  }
+  void K(double t, VecIn q, VecIn v, VecIn rho, MatOut K) const override {
+    named_throw(name_, [&] { force_->K(t, q, v, own(rho), K); });
+  }
+  void C(double t, VecIn q, VecIn v, VecIn rho, MatOut C) const override {
+    named_throw(name_, [&] { force_->C(t, q, v, own(rho), C); });
+  }
+  void Q_rho(double t, VecIn q, VecIn v, VecIn rho, MatOut Q_rho) const override {
+    add_in_rho([&](const VecIn& p, MatOut out) { force_->Q_rho(t, q, v, p, out); }, rho, Q_rho);
+  }
 
-  void L(VecIn q, VecIn v, VecIn z, VecIn rho, VecOut L) const override;
-  void M(VecIn q, VecIn rho, MatOut M) const override;
-  void L_q(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_q) const override;
-  void L_v(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_v) const override;
-  void L_rho(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_rho) const override;
+  void L(VecIn q, VecIn v, VecIn z, VecIn rho, VecOut L) const override {
+    named_throw(name_, [&] { force_->inertia()->L(q, v, z, own(rho), L); });
+  }
+  void M(VecIn q, VecIn rho, MatOut M) const override {
+    named_throw(name_, [&] { force_->inertia()->M(q, own(rho), M); });
+  }
+  void L_q(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_q) const override {
+    named_throw(name_, [&] { force_->inertia()->L_q(q, v, z, own(rho), L_q); });
+  }
+  void L_v(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_v) const override {
+    named_throw(name_, [&] { force_->inertia()->L_v(q, v, z, own(rho), L_v); });
+  }
+  void L_rho(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_rho) const override {
+    add_in_rho([&](const VecIn& p, MatOut out) { force_->inertia()->L_rho(q, v, z, p, out); }, rho, L_rho);
+  }
 
  private:
   VecIn own(const VecIn& rho) const { return values_ ? VecIn(values_->p) : rho; }
-  template <class F>
-  void add_in_rho(F&& f, const VecIn& rho, MatOut out) const;  // out += df/dp dp/drho; f(p, df_dp)
+  // out += df/dp dp/drho; f(p, df_dp)
+  void add_in_rho(auto&& f, const VecIn& rho, MatOut out) const {
+    named_throw(name_, [&] {
+      if (!values_) return f(rho, out);
+      Eigen::MatrixXd of_p = Eigen::MatrixXd::Zero(out.rows(), values_->p.size());
+      f(VecIn(values_->p), MatOut(of_p));
+      out += of_p * values_->p_rho;
+    });
+  }
 
   std::shared_ptr<const UserForce> force_;
   std::vector<std::string> bodies_;
@@ -56,6 +82,8 @@ class BoundForce final : public UserForce, public InertialLoad {
 };
 
 // The bodies on which a force of a problem acts.
-std::vector<std::string> bodies_of(const UserForceSpec& force);
+inline std::vector<std::string> bodies_of(const UserForceSpec& force) {
+  return force.bodies.empty() && force.term ? force.term->bodies() : force.bodies;
+}
 
 }  // namespace mbsopt
