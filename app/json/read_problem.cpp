@@ -22,17 +22,20 @@ namespace mbsopt::inline app {
 
 namespace {
 
-// With simulation.accuracy all settings are chosen later.
+// Gives the integrator the defaults that the file leaves out. A type in the file keeps its own tolerances
+// (settings.hpp) and has no limit of the step. With simulation.accuracy all settings are chosen later.
 void complete_integrator(SimulationSettings& settings, const Node& root) {
   if (settings.accuracy) return;
   const Node* const simulation = root.find("simulation");
   const Node* const integrator = simulation ? simulation->find("integrator") : nullptr;
   const auto has = [&](const char* key) { return integrator && integrator->find(key); };
-  choose_what_is_left_out(settings, {.type = has("type"),
-                                     .rtol = has("rtol"),
-                                     .atol = has("atol"),
-                                     .step = has("step"),
-                                     .max_step = has("max_step")});
+  const IntegratorSettings chosen = default_integrator(settings.start_time, settings.end_time);
+  IntegratorSettings& s = settings.integrator;
+  if (!has("type")) s.type = chosen.type;
+  if (s.type != chosen.type) return;
+  if (!has("rtol")) s.rtol = chosen.rtol;
+  if (!has("atol")) s.atol = chosen.atol;
+  if (!has("type") && !has("step") && !has("max_step")) s.max_step = chosen.max_step;
 }
 
 void resolve_data_files(Problem& problem, ProblemSource& source) {
@@ -82,24 +85,21 @@ void read_samples(Problem& problem, ProblemSource& source) {
   Scene& scene = problem.scene;
   for (Signal& signal : scene.signals)
     reader.read(signal, signal.interpolation, child_path("signals", signal.name), ".file");
-  const auto read_law = [&](std::optional<SampledLaw>& law, const std::string& path) {
-    if (law) reader.read(*law, Interpolation::spline, path + ".law", ".csv");
+  const auto read_laws = [&](auto& drives, const std::string& list) {
+    for (std::size_t i = 0; i < drives.size(); ++i)
+      if (drives[i].samples)
+        reader.read(*drives[i].samples, Interpolation::spline, child_path(list, i) + ".law", ".csv");
   };
-  const auto read_laws = [&](std::vector<DriveLaw>& laws, const std::string& owner) {
-    for (std::size_t i = 0; i < laws.size(); ++i) read_law(laws[i].samples, child_path(owner + ".drives", i));
-  };
-  const auto read_signals = [&](std::vector<SignalSamples>& all, const std::string& owner) {
-    for (SignalSamples& samples : all) {
+  const auto read_variant = [&](auto& variant, const std::string& path) {
+    read_laws(variant.drives, path + ".drives");
+    for (SignalSamples& samples : variant.signals) {
       const auto signal = std::ranges::find(scene.signals, samples.name, &Signal::name);
       if (signal != scene.signals.end())
-        reader.read(samples, signal->interpolation, child_path(owner + ".signals", samples.name), ".file");
+        reader.read(samples, signal->interpolation, child_path(path + ".signals", samples.name), ".file");
     }
   };
-  for (std::size_t i = 0; i < scene.drives.size(); ++i) read_law(scene.drives[i].samples, child_path("drives", i));
-  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
-    read_laws(problem.cases[c].drives, child_path("cases", c));
-    read_signals(problem.cases[c].signals, child_path("cases", c));
-  }
+  read_laws(scene.drives, "drives");
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) read_variant(problem.cases[c], child_path("cases", c));
   for (ObjectiveSpec& objective : problem.objectives)
     for (std::size_t k = 0; k < objective.track.size(); ++k) {
       const std::string list = child_path("objectives", objective.name) + ".track";
@@ -108,11 +108,8 @@ void read_samples(Problem& problem, ProblemSource& source) {
     }
   if (!problem.identification) return;
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
-  for (std::size_t e = 0; e < experiments.size(); ++e) {
-    const std::string place = child_path("identification.experiments", e);
-    read_laws(experiments[e].drives, place);
-    read_signals(experiments[e].signals, place);
-  }
+  for (std::size_t e = 0; e < experiments.size(); ++e)
+    read_variant(experiments[e], child_path("identification.experiments", e));
 }
 
 // Adds an error to the findings, at its part of an expression if it names one. Adds a warning to the list, if any.

@@ -8,13 +8,14 @@
 
 namespace mbsopt {
 
-IntegratorSettings default_integrator(double start_time, double end_time);
-
-// The fields of an integrator that a file gives; defaults replace the rest. A type in the file keeps its own tolerances
-// (settings.hpp) and has no limit of the step.
-struct IntegratorGiven {
-  bool type = false, rtol = false, atol = false, step = false, max_step = false;
-};
-void choose_what_is_left_out(SimulationSettings& settings, const IntegratorGiven& given);
+inline IntegratorSettings default_integrator(double start_time, double end_time) {
+  constexpr double kSteps = 150;  // in the run, at least
+  IntegratorSettings settings;
+  settings.type = "dopri853";
+  settings.rtol = 1e-8;
+  settings.atol = 1e-10;
+  if (end_time > start_time) settings.max_step = (end_time - start_time) / kSteps;
+  return settings;
+}
 
 }  // namespace mbsopt
