@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <vector>
@@ -62,7 +61,7 @@ std::string with_value(const std::string& text, std::string_view path, const std
     const std::string value = text.substr(node->begin, node->end - node->begin);
     return replaced(text, node->begin, node->end, "{\"value\": " + value + ", " + member + "}");
   }
-  if (!node->keys.empty()) member += ", ";
+  if (!node->items.empty()) member += ", ";
   return replaced(text, node->begin + 1, node->begin + 1, member);
 }
 
@@ -71,18 +70,14 @@ std::string without_member(const std::string& text, std::string_view path) {
   const Node root = parse_json(findings);
   findings.throw_if_any();
   const Node *parent = nullptr, *node = &root;
-  std::size_t at = 0;
   for (const PathStep& step : parse_path(path)) {
-    if (node->kind != Node::Kind::object) return text;
-    const auto key = std::find(node->keys.begin(), node->keys.end(), step.key);
-    if (key == node->keys.end()) return text;
     parent = node;
-    at = static_cast<std::size_t>(key - node->keys.begin());
-    node = &node->items[at];
+    node = parent->find(step.key);
+    if (!node) return text;
   }
   if (!parent) return text;
-  if (at + 1 < parent->keys.size()) return replaced(text, parent->key_offsets[at], parent->key_offsets[at + 1], "");
-  return replaced(text, at > 0 ? parent->items[at - 1].end : parent->key_offsets[at], node->end, "");
+  if (node != &parent->items.back()) return replaced(text, node->key_begin, (node + 1)->key_begin, "");
+  return replaced(text, node != &parent->items.front() ? (node - 1)->end : node->key_begin, node->end, "");
 }
 
 std::string with_override(const std::string& text, const std::string& override_text) {

@@ -18,11 +18,9 @@
 namespace mbsopt::inline app {
 namespace {
 
-const char* shape_of(Node::Kind kind) { return kind == Node::Kind::array ? "a list [...]" : "an object {...}"; }
-
 PlacedNode of_kind(const PlacedNode& given, Node::Kind kind) {
   if (!given || given->kind == kind) return given;
-  given.refuse(std::string("must be ") + shape_of(kind) + ", found " + what_is(*given));
+  given.must_be(kind == Node::Kind::array ? "a list [...]" : "an object {...}");
   return {};
 }
 
@@ -32,7 +30,7 @@ bool read_expression(const PlacedNode& given, Expression& value) {
     return true;
   }
   if (given->kind != Node::Kind::string) {
-    given.refuse("must be a number or an expression in a string, found " + what_is(*given));
+    given.must_be("a number or an expression in a string");
     return false;
   }
   try {
@@ -82,13 +80,13 @@ void read_plain(const PlacedNode& given, bool& value, const std::optional<Dimens
   if (given->kind == Node::Kind::boolean)
     value = given->boolean;
   else
-    given.refuse("must be true or false, found " + what_is(*given));
+    given.must_be("true or false");
 }
 
 template <std::size_t N>
 bool read_vector(const PlacedNode& given, std::array<Field, N>& value) {
   if (given->kind != Node::Kind::array || given->items.size() != N) {
-    given.refuse("must be a list of " + std::to_string(N) + " numbers or expressions, found " + what_is(*given));
+    given.must_be("a list of " + std::to_string(N) + " numbers or expressions");
     return false;
   }
   bool good = true;
@@ -103,7 +101,7 @@ void read_point(const PlacedNode& given, PointField& value) {
   else if (given->kind == Node::Kind::array)
     read_vector(given, value.emplace<VectorField>());
   else
-    given.refuse("must be the name of a point or a list of 3 coordinates, found " + what_is(*given));
+    given.must_be("the name of a point or a list of 3 coordinates");
 }
 
 // A value with a unit has the meaning of "unit", and must not contradict it.
@@ -133,7 +131,7 @@ class FieldReader {
   // Reads an object's fields into `value`, and reports the keys that it does not have.
   template <class T>
   static void read(const PlacedNode& given, T& value) {
-    if (given->kind != Node::Kind::object) return given.refuse("must be an object {...}, found " + what_is(*given));
+    if (given->kind != Node::Kind::object) return given.must_be("an object {...}");
     FieldReader reader(given);
     describe(reader, value);
     reader.report_keys();
@@ -216,16 +214,15 @@ class FieldReader {
     if (given->kind == Node::Kind::object) {
       const PlacedNode lengths = given.find("consistent");
       if (!lengths) return read(given, tensor);
-      if (given->keys.size() > 1)
+      if (given->items.size() > 1)
         given.refuse("has \"consistent\" and other keys; \"consistent\" must be the only key");
       return read(lengths, consistent.emplace());
     }
     std::array<Field, 3> diagonal;
     if (given->kind != Node::Kind::array || given->items.size() != 3)
-      given.refuse(
-          "must be {\"xx\":..,\"yy\":..,\"zz\":..,\"xy\":..,\"xz\":..,\"yz\":..}, [xx, yy, zz] or "
-          "{\"consistent\": {\"x\":..,\"y\":..,\"z\":..}}, found " +
-          what_is(*given));
+      given.must_be(
+          "{\"xx\":..,\"yy\":..,\"zz\":..,\"xy\":..,\"xz\":..,\"yz\":..}, [xx, yy, zz] or "
+          "{\"consistent\": {\"x\":..,\"y\":..,\"z\":..}}");
     else if (read_vector(given, diagonal))
       tensor = {diagonal[0], diagonal[1], diagonal[2], 0.0, 0.0, 0.0};
   }
@@ -240,8 +237,7 @@ class FieldReader {
     else if (is_object && given->find("rpy"))
       read(given, value.emplace<RollPitchYawField>());
     else
-      given.refuse("must be [e0, e1, e2, e3], {\"axis\": [x, y, z], \"angle\": a} or {\"rpy\": [r, p, y]}, found " +
-                   what_is(*given));
+      given.must_be("[e0, e1, e2, e3], {\"axis\": [x, y, z], \"angle\": a} or {\"rpy\": [r, p, y]}");
   }
   void points(std::string_view key, std::map<std::string, VectorField>& value, const FieldInfo& info) {
     const PlacedNode given = get_object(key, info);
@@ -327,10 +323,14 @@ class FieldReader {
 
   void version(std::string_view key, int only, const FieldInfo& info) {
     const PlacedNode given = get(key, info);
-    if (given && (given->kind != Node::Kind::number || given->number != only))
-      given.refuse("must be " + std::to_string(only) + ", found " + what_is(*given));
+    if (given && (given->kind != Node::Kind::number || given->number != only)) given.must_be(std::to_string(only));
   }
-  void misplaced(std::string_view key, std::string_view where) { refuse(key, "is " + std::string(where)); }
+  void misplaced(std::string_view key, std::string_view where) {
+    const PlacedNode given = object_.find(key);
+    if (!given) return;
+    known_.emplace_back(key);
+    given.refuse("is " + std::string(where));
+  }
   void rest_unknown() { rest_unknown_ = true; }
   // Reports, at the end of an object, unknown keys and missing required ones. An unknown key that resembles a missing
   // one is one finding.
@@ -370,14 +370,6 @@ class FieldReader {
     const Node* const given = object_->find(key);
     return given && given->kind == Node::Kind::object;
   }
-  // Refuses a key if it is given.
-  void refuse(std::string_view key, const std::string& message) {
-    const PlacedNode given = object_.find(key);
-    if (!given) return;
-    known_.emplace_back(key);
-    given.refuse(message);
-  }
-
   // Sets the value that a word stands for. `also` ends the finding about another word.
   template <class T, std::size_t N>
   static void take(const PlacedNode& given, std::string_view key, const std::string& word,
@@ -436,7 +428,7 @@ class FieldReader {
     if (is_string)
       value = given->string;
     else
-      given.refuse("must be a string, found " + what_is(*given));
+      given.must_be("a string");
     return is_string;
   }
 

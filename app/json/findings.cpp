@@ -35,14 +35,18 @@ void Findings::add_inside(const Node& node, std::size_t at, const std::string& p
 }
 
 void Findings::add_at(std::size_t offset, const std::string& path, const std::string& message) {
-  const Position position = text_.position(offset);
-  found_.push_back({offset, {file_, position.line, position.column, path, message}});
+  found_.push_back({offset, at(offset, path, message)});
   mark(path);
 }
 
 void Findings::add_override(const std::string& path, const std::string& message) {
   found_.push_back({std::numeric_limits<std::size_t>::max(), {"", 0, 0, path, message}});
   mark(path);
+}
+
+Finding Findings::at(std::size_t offset, const std::string& path, const std::string& message) const {
+  const auto [line, column] = text_.position(offset);
+  return {file_, line, column, path, message};
 }
 
 void Findings::mark(std::string_view path) {
@@ -56,9 +60,7 @@ bool Findings::concerns(std::string_view path) const {
 }
 
 Finding Findings::finding(const Node& node, const std::string& path, const std::string& message) const {
-  if (node.source != 0) return {"", 0, 0, path, message};
-  const Position position = text_.position(node.begin);
-  return {file_, position.line, position.column, path, message};
+  return node.source == 0 ? at(node.begin, path, message) : Finding{"", 0, 0, path, message};
 }
 
 void Findings::throw_if_any() const {
@@ -84,9 +86,8 @@ std::vector<PlacedNode> PlacedNode::items() const {
 }
 
 void PlacedNode::refuse_key(const std::string& message) const {
-  const Node& object = *around_->node_;
-  if (object.source == 0 && node_->source == 0)
-    findings_->add_at(object.key_offsets[index_], path(), message);
+  if (around_->node_->source == 0 && node_->source == 0)
+    findings_->add_at(node_->key_begin, path(), message);
   else
     findings_->add_override(path(), message);
 }

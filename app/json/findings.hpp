@@ -40,6 +40,7 @@ class Findings {
     std::size_t offset;
     Finding finding;
   };
+  Finding at(std::size_t offset, const std::string& path, const std::string& message) const;
   void mark(std::string_view path);
 
   std::string file_;
@@ -61,12 +62,13 @@ class PlacedNode {
   PlacedNode find(std::string_view key) const;  // of an object
   // The values in an object or a list. An absent value has none.
   std::vector<PlacedNode> items() const;
-  const std::string& key() const { return around_->node_->keys[index_]; }  // its key in the object around it
+  const std::string& key() const { return node_->key; }  // its key in the object around it
   std::string path() const;
   Findings& findings() const { return *findings_; }
 
   // Add a finding about the value, about its key, or about byte `at` of its string.
   void refuse(const std::string& message) const { findings_->add(*node_, path(), message); }
+  void must_be(const std::string& what) const { refuse("must be " + what + ", found " + what_is(*node_)); }
   void refuse_key(const std::string& message) const;
   void refuse_inside(std::size_t at, const std::string& message) const {
     findings_->add_inside(*node_, at, path(), message);

@@ -8,10 +8,9 @@
 
 namespace mbsopt::inline app {
 
-const Node* Node::find(std::string_view key) const {
-  for (std::size_t i = 0; i < keys.size(); ++i)
-    if (keys[i] == key) return &items[i];
-  return nullptr;
+const Node* Node::find(std::string_view wanted) const {
+  const auto found = kind == Kind::object ? std::ranges::find(items, wanted, &Node::key) : items.end();
+  return found == items.end() ? nullptr : &*found;
 }
 
 const Node* Node::at(const PathStep& step) const {

@@ -22,15 +22,15 @@ struct Node {
   Kind kind = Kind::null;
   bool boolean = false;
   double number = 0;
-  std::string string;             // of a string: its value, escapes resolved
-  std::vector<Node> items;        // of an array; of an object: the values of its keys
-  std::vector<std::string> keys;  // of an object
-  std::vector<std::size_t> key_offsets;
-  std::size_t begin = 0, end = 0;  // its first byte in the text, and one after its last
+  std::string string = {};         // of a string: its value, escapes resolved
+  std::vector<Node> items = {};    // of an array; of an object: the values of its keys
+  std::string key = {};            // in the object around it
+  std::size_t key_begin = 0;       // its first byte in the text
+  std::size_t begin = 0, end = 0;  // its own first byte, and one after its last
   int source = 0;                  // 0: the problem file, k: the k-th --set
 
-  const Node* find(std::string_view key) const;  // of an object; nullptr when there is none
-  const Node* at(const PathStep& step) const;    // of an object or a list; nullptr when there is none
+  const Node* find(std::string_view wanted) const;  // by its key, of an object; nullptr when there is none
+  const Node* at(const PathStep& step) const;       // of an object or a list; nullptr when there is none
 };
 
 // "an object", "a list of 2", "the number 3", "the string 'x'", ...

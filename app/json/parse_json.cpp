@@ -82,7 +82,7 @@ class JsonParser {
     if (first == '{' || first == '[') {
       if (open_.size() == kDeepestNesting)
         throw JsonFault{at_, fmt::format("nests deeper than {} levels", kDeepestNesting)};
-      open_.push_back(&node);
+      open_.push_back({&node, ""});
       node.kind = first == '{' ? Node::Kind::object : Node::Kind::array;
       read_items(node);
       open_.pop_back();
@@ -109,24 +109,21 @@ class JsonParser {
     std::unordered_set<std::string> keys;
     ++at_;
     for (bool more = next() != close; more;) {
+      std::size_t key_begin = 0;
       bool twice = false;
       if (object) {
         if (next() != '"') expected("a name in double quotes");
-        node.key_offsets.push_back(at_);
-        node.keys.push_back(read_scalar().get<std::string>());
-        twice = !keys.insert(node.keys.back()).second;
-        if (twice && findings_)
-          findings_->add_at(node.key_offsets.back(), path(), "this key is there twice; a key is allowed once");
+        key_begin = at_;
+        open_.back().key = read_scalar().get<std::string>();
+        twice = !keys.insert(open_.back().key).second;
+        if (twice && findings_) findings_->add_at(key_begin, path(), "this key is there twice; a key is allowed once");
         if (next() != ':') expected("':'");
         ++at_;
       }
       Node item = value();
-      if (!twice) {
-        node.items.push_back(std::move(item));
-      } else {  // reported: nothing else is to stumble over it
-        node.keys.pop_back();
-        node.key_offsets.pop_back();
-      }
+      item.key = open_.back().key;
+      item.key_begin = key_begin;
+      if (!twice) node.items.push_back(std::move(item));  // else it is reported: nothing else is to stumble over it
       const char after = next();
       more = after == ',';
       if (!more && after != close)
@@ -139,9 +136,8 @@ class JsonParser {
 
   std::string path() const {
     std::string path;
-    for (const Node* node : open_)
-      path =
-          node->kind == Node::Kind::object ? child_path(path, node->keys.back()) : child_path(path, node->items.size());
+    for (const auto& [node, key] : open_)
+      path = node->kind == Node::Kind::object ? child_path(path, key) : child_path(path, node->items.size());
     return path;
   }
 
@@ -168,7 +164,11 @@ class JsonParser {
   int source_;
   Findings* findings_;
   std::size_t at_ = 0;
-  std::vector<const Node*> open_;  // objects and lists around the place
+  struct Open {
+    const Node* node;
+    std::string key;  // of the value that is read in it
+  };
+  std::vector<Open> open_;  // objects and lists around the place
 };
 
 }  // namespace

@@ -25,27 +25,19 @@ std::string path_before(const std::string& words) {
 
 // Returns the member of an object, and creates it if it is missing.
 Node& member(Node& object, const std::string& key, int number) {
-  for (std::size_t i = 0; i < object.keys.size(); ++i)
-    if (object.keys[i] == key) return object.items[i];
-  object.keys.push_back(key);
-  object.key_offsets.push_back(0);
-  Node& made = object.items.emplace_back();
-  made.kind = Node::Kind::object;
-  made.source = number;
-  return made;
+  const auto found = std::ranges::find(object.items, key, &Node::key);
+  return found != object.items.end()
+             ? *found
+             : object.items.emplace_back(Node{.kind = Node::Kind::object, .key = key, .source = number});
 }
 
 // "k1": 100 is short for "k1": {"value": 100}; parameters.k1.value sets both.
 void spell_out_parameter(Node& parameter) {
-  Node object;
-  object.kind = Node::Kind::object;
-  object.begin = parameter.begin;
-  object.end = parameter.end;
-  object.source = parameter.source;
-  object.keys.push_back("value");
-  object.key_offsets.push_back(parameter.begin);
-  object.items.push_back(std::move(parameter));
-  parameter = std::move(object);
+  Node value = parameter;
+  value.key = "value";
+  value.key_begin = value.begin;
+  parameter.kind = Node::Kind::object;
+  parameter.items = {std::move(value)};
 }
 
 // --set path=value: changes a value before it is read, and creates the objects on the way to it. override_text is
@@ -91,25 +83,23 @@ void apply_override(Node& root, const std::string& override_text, int number, Fi
     here = step.is_index ? child_path(here, step.index) : child_path(here, step.key);
     node = step.is_index ? &node->items[step.index] : &member(*node, step.key, number);
   }
-  *node = parse_override_value(override_text.substr(equals + 1), number);
+  Node value = parse_override_value(override_text.substr(equals + 1), number);
+  value.key = node->key;
+  value.key_begin = node->key_begin;
+  *node = std::move(value);
 }
 
 }  // namespace
 
-std::optional<Finding> ProblemSource::finding(const std::string& words) const {
+std::optional<std::string> ProblemSource::placed(const std::string& words) const {
   const std::string path = path_before(words);
   if (path.empty()) return std::nullopt;
   try {
     if (&nearest(root, path) == &root) return std::nullopt;
-    return finding(path, words.substr(path.size() + 2));
+    return to_string(finding(path, words.substr(path.size() + 2)));
   } catch (const std::invalid_argument&) {  // no path: the words alone will do
     return std::nullopt;
   }
-}
-
-std::optional<std::string> ProblemSource::placed(const std::string& words) const {
-  const std::optional<Finding> found = finding(words);
-  return found ? std::optional(to_string(*found)) : std::nullopt;
 }
 
 ProblemSource problem_source_of(const std::string& text, const std::filesystem::path& name,

@@ -35,7 +35,6 @@ struct ProblemSource {
 
   // Returns nothing if the words do not begin with a path of the problem.
   std::optional<std::string> placed(const std::string& words) const;
-  std::optional<Finding> finding(const std::string& words) const;
 };
 
 // Throws InputError if the file cannot be read, or if its text is not JSON.

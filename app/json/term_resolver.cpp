@@ -155,20 +155,21 @@ class TermResolver {
 void resolve_terms(Problem& problem, const ReadOptions& options, ProblemSource& source) {
   TermResolver resolver(options.terms, source);
   resolver.load(problem.plugins, options.allow_plugins);
-  const auto laws = [&](std::vector<DriveLaw>& all, const std::string& owner) {
-    for (std::size_t i = 0; i < all.size(); ++i)
-      resolver.resolve(all[i].law, all[i].samples, child_path(owner + ".drives", i) + ".law");
+  const auto resolve_laws = [&](auto& drives, const std::string& list) {
+    for (std::size_t i = 0; i < drives.size(); ++i)
+      resolver.resolve(drives[i].law, drives[i].samples, child_path(list, i) + ".law");
   };
   Scene& scene = problem.scene;
   for (std::size_t i = 0; i < scene.forces.size(); ++i) resolver.resolve(scene.forces[i], child_path("forces", i));
-  for (std::size_t i = 0; i < scene.drives.size(); ++i)
-    resolver.resolve(scene.drives[i].law, scene.drives[i].samples, child_path("drives", i) + ".law");
+  resolve_laws(scene.drives, "drives");
   for (ObjectiveSpec& objective : problem.objectives)
     if (objective.user) resolver.resolve(*objective.user, child_path("objectives", objective.name) + ".user");
-  for (std::size_t c = 0; c < problem.cases.size(); ++c) laws(problem.cases[c].drives, child_path("cases", c));
+  for (std::size_t c = 0; c < problem.cases.size(); ++c)
+    resolve_laws(problem.cases[c].drives, child_path("cases", c) + ".drives");
   if (!problem.identification) return;
   for (std::size_t e = 0; e < problem.identification->experiments.size(); ++e)
-    laws(problem.identification->experiments[e].drives, child_path("identification.experiments", e));
+    resolve_laws(problem.identification->experiments[e].drives,
+                 child_path("identification.experiments", e) + ".drives");
 }
 
 }  // namespace mbsopt::inline app
