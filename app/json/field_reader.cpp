@@ -243,10 +243,7 @@ class FieldReader {
     const PlacedNode given = get_object(key, info);
     for (const PlacedNode& item : given.items()) read_vector(item, value[item.key()]);
   }
-  void law(std::string_view key, std::optional<Expression>& value, Scope, const FieldInfo& info) {
-    number(key, value, info);
-  }
-  void expression(std::string_view key, Expression& value, Scope, const FieldInfo& info) { number(key, value, info); }
+  void expression(std::string_view key, auto& value, Scope, const FieldInfo& info) { number(key, value, info); }
   void time_law(std::string_view key, Expression& value, std::optional<SampledLaw>& samples, const FieldInfo& info) {
     const PlacedNode given = get(key, info);
     if (given && given->kind == Node::Kind::object)

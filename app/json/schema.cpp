@@ -119,10 +119,7 @@ class SchemaWriter {
   void points(std::string_view key, std::map<std::string, VectorField>&, const FieldInfo& info) {
     put(key, info, {{"type", "object"}, {"propertyNames", names_pattern()}, {"additionalProperties", ref("vector")}});
   }
-  void law(std::string_view key, std::optional<Expression>& value, Scope, const FieldInfo& info) {
-    number(key, value, info);
-  }
-  void expression(std::string_view key, Expression& value, Scope, const FieldInfo& info) { number(key, value, info); }
+  void expression(std::string_view key, auto& value, Scope, const FieldInfo& info) { number(key, value, info); }
   void time_law(std::string_view key, Expression&, std::optional<SampledLaw>&, const FieldInfo& info) {
     SampledLaw called;
     called.function = "f";
@@ -174,8 +171,7 @@ class SchemaWriter {
   void object(std::string_view key, std::optional<T>&, const FieldInfo& info) {
     put(key, info, object_schema<T>());
   }
-  template <class F>
-  void group(std::string_view key, const FieldInfo& info, F&& fields) {
+  void group(std::string_view key, const FieldInfo& info, auto&& fields) {
     SchemaWriter inside;
     fields(inside);
     put(key, info, inside.object());
@@ -220,12 +216,6 @@ class SchemaWriter {
   }
 };
 
-void choose(Joint& joint, const TypeRow& row) { joint.type = row.name; }
-void choose(Drive& drive, const TypeRow& row) { drive.type = row.name; }
-void choose(Force& force, const TypeRow& row) { set_type(force, row.name); }
-void choose(Sensor& sensor, const TypeRow& row) { sensor.quantity = row.name; }
-void choose(auto&, const TypeRow&) {}
-
 template <class T>
 Json object_schema_of(T value) {
   SchemaWriter writer;
@@ -242,7 +232,7 @@ Json object_schema() {
   Json variants = Json::array();
   for (const TypeRow& row : writer.rows) {
     T variant;
-    choose(variant, row);
+    become(variant, row);
     Json schema = object_schema_of(variant);
     schema["title"] = row.name;
     variants.push_back(std::move(schema));

@@ -55,62 +55,62 @@ std::size_t unreadable_character(std::string_view text) {
 std::string text_of(double value) { return std::isnan(value) ? "not a number" : Expression(value).text(); }
 
 void Checker::name(std::string_view key, const std::string& value, const FieldInfo&) {
-  if (value.empty()) return issue(path(key), "is empty, a name is expected");
+  if (value.empty()) return refuse(key, "is empty, a name is expected");
   must_be_readable(path(key), value);
   if (value.find_first_of(".,;\"'[]/\\") != std::string::npos)
-    issue(path(key), "the name '" + value + "' must not contain . , ; \" ' [ ] / \\ or control characters");
+    refuse(key, "the name '{}' must not contain . , ; \" ' [ ] / \\ or control characters", value);
 }
 
 void Checker::must_be_readable(const std::string& where, const std::string& name) {
   if (name.size() > kLongestName)
-    issue(where, "the name is " + std::to_string(name.size()) + " bytes long, at most " + std::to_string(kLongestName) +
-                     " are allowed");
+    issue(where, filled("the name is {} bytes long, at most {} are allowed", name.size(), kLongestName));
   if (const std::size_t at = unreadable_character(name); at != std::string::npos)
-    issue(where, "the name has a control character or a mark of text direction at byte " + std::to_string(at + 1) +
-                     "; it must show as it is written");
+    issue(where, filled("the name has a control character or a mark of text direction at byte {}; it must show as it "
+                        "is written",
+                        at + 1));
 }
 
 void Checker::must_be_identifier(const std::string& where, const std::string& name) {
-  if (is_identifier(name)) must_be_readable(where, name);
   if (!is_identifier(name))
-    issue(where, "the name '" + name + "' must be an identifier: letters, digits and _, not beginning with a digit");
-  else if (has_word(kReservedNames, name))
-    issue(where, "the name '" + name + "' is reserved; reserved are " + joined(words(kReservedNames)));
+    return issue(
+        where, filled("the name '{}' must be an identifier: letters, digits and _, not beginning with a digit", name));
+  must_be_readable(where, name);
+  if (has_word(kReservedNames, name))
+    issue(where, filled("the name '{}' is reserved; reserved are {}", name, joined(words(kReservedNames))));
   else if (find_function(name))
-    issue(where, "the name '" + name + "' is that of a function");
+    issue(where, filled("the name '{}' is that of a function", name));
 }
 
 void Checker::check_reference(const std::string& where, const std::string& value, ElementKind what) {
   if (facts_.has(what, value)) return;
   const auto [one, all] = kKinds[static_cast<std::size_t>(what)];
-  const std::string text = std::string("there is no ") + one + " '" + value + "'";
+  const std::string text = filled("there is no {} '{}'", one, value);
   if (issues_.size() >= kWithHints) return issue(where, text);
-  const std::vector<std::string> names = facts_.names(what);
+  const std::vector<std::string>& names = facts_.names(what);
   issue(where, text + did_you_mean(value, names) + listed(all, names));
 }
 
 void Checker::reference(std::string_view key, const std::string& value, ElementKind what, const FieldInfo& info) {
   if (info.need == Need::unknown || (value.empty() && info.need == Need::optional)) return;
-  if (value.empty()) return issue(path(key), "is missing; expected: " + std::string(info.description));
-  if (!facts_.has(what, value)) check_reference(path(key), value, what);
+  if (value.empty()) return refuse(key, "is missing; expected: {}", info.description);
+  check_reference(path(key), value, what);
 }
 
 void Checker::references(std::string_view key, const std::vector<std::string>& values, ElementKind what,
                          const FieldInfo& info) {
-  if (values.empty() && info.need == Need::required)
-    issue(path(key), "is empty; expected: " + std::string(info.description));
+  if (values.empty() && info.need == Need::required) refuse(key, "is empty; expected: {}", info.description);
   std::set<std::string> listed_before;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const std::string where = child_path(path(key), i);
     check_reference(where, values[i], what);
-    if (!listed_before.insert(values[i]).second) issue(where, "'" + values[i] + "' is listed twice");
+    if (!listed_before.insert(values[i]).second) issue(where, filled("'{}' is listed twice", values[i]));
   }
 }
 
 void Checker::word(std::string_view key, const std::string& value, const Words& allowed, const FieldInfo& info) {
   if (info.need == Need::unknown) return;
   if (value.empty() && info.need == Need::required)
-    issue(path(key), "is missing; available: " + joined(words(allowed.available)));
+    refuse(key, "is missing; available: {}", joined(words(allowed.available)));
   else if (!value.empty() && !has_word(allowed.available, value))
     issue(path(key), not_among(key, value, words(allowed.available)));
 }
@@ -132,17 +132,13 @@ bool Checker::names_are_known(const std::string& where, const Expression& value,
       continue;
     }
     known = false;
-    const std::vector<std::string> known_names =
-        issues_.size() < kWithHints ? symbols.names() : std::vector<std::string>{};
-    const std::vector<SyntaxNode>& nodes = value.tree().nodes;
-    const auto node = std::find_if(nodes.begin(), nodes.end(), [&](const SyntaxNode& n) {
-      return n.operation == Operation::name && n.name == name;
-    });
-    issues_.push_back(
-        {where,
-         "unknown name '" + name + "'" +
-             (known_names.empty() ? "" : did_you_mean(name, known_names) + listed("known names", known_names)),
-         false, node->offset});
+    std::string message = filled("unknown name '{}'", name);
+    if (issues_.size() < kWithHints) {
+      const std::vector<std::string> all = symbols.names();
+      message += all.empty() ? "" : did_you_mean(name, all) + listed("known names", all);
+    }
+    const auto node = std::ranges::find(value.tree().nodes, name, &SyntaxNode::name);
+    issues_.push_back({where, message, false, node->offset});
   }
   return known;
 }
@@ -155,7 +151,7 @@ void Checker::check_dimension(const std::string& where, const Expression& value,
     });
     if (expected && !fits(found, *expected))
       issue(where,
-            "'" + value.text() + "' has the dimension " + to_string(*found) + ", expected is " + to_string(*expected));
+            filled("'{}' has the dimension {}, expected is {}", value.text(), to_string(*found), to_string(*expected)));
     if (expected && (!found || found->is_none())) ask_for_degrees(where, value, names, *expected);
   } catch (const DimensionError& error) {
     issues_.push_back({where, error.what(), false, error.offset});
@@ -174,13 +170,13 @@ void Checker::ask_for_degrees(const std::string& where, const Expression& value,
   const double angle = law ? (*law)[0] : is_angle ? x : 0, rate = law ? (*law)[1] : is_rate ? x : 0;
   const bool is_large = std::abs(angle) > 2 * std::numbers::pi;
   const bool is_round = rate != 0 && std::remainder(rate, 45) == 0 && std::remainder(rate, 50) != 0;
+  const std::string& text = value.text();
   if (!is_large && !is_round) return;
-  const std::string text = value.text();
   if (text.find_first_of('[') != std::string::npos || text.find("pi") != std::string::npos) return;
-  const std::string unit = is_large ? "rad" : "rad/s", degrees = is_large ? "deg" : "deg/s";
-  warning(where, "'" + text + "' is " + text_of(is_large ? angle : rate) + " " + unit +
-                     (is_law ? " at the start" : "") + ": are degrees meant? Write the unit, as in \"" +
-                     text_of(is_large ? angle : rate) + " [" + degrees + "]\" or \"[" + unit + "]\"");
+  const std::string per = is_large ? "" : "/s", found = text_of(is_large ? angle : rate);
+  warning(where, filled("'{0}' is {1} rad{2}{3}: are degrees meant? Write the unit, as in \"{1} [deg{2}]\" or "
+                        "\"[rad{2}]\"",
+                        text, found, per, is_law ? " at the start" : ""));
 }
 
 void Checker::check_expression(const std::string& where, const Expression& value, Scope names,
@@ -188,9 +184,7 @@ void Checker::check_expression(const std::string& where, const Expression& value
   if (!names_are_known(where, value, names)) return;
   if (names == Scope::state) check_sensors_of_state(where, value);
   if (names != Scope::objective) check_dimension(where, value, names, expected);
-  if (value.is_number() || names == Scope::none) {
-    check_size(where, value);
-  }
+  if (value.is_number() || names == Scope::none) check_size(where, value);
 }
 
 // Sums of squares must stay below the largest double, 1.8e308.
@@ -198,9 +192,9 @@ void Checker::check_size(const std::string& where, const Expression& value) {
   constexpr double kLargest = 1e150;
   const std::optional<double> x = facts_.any_value(value);
   if (!x || std::abs(*x) <= kLargest) return;
-  const std::string is = "'" + value.text() + "' is " + text_of(*x) + " at the values of the parameters; ";
-  issue(where, is + (std::isfinite(*x) ? "its square must be a number: at most " + text_of(kLargest) + " is allowed"
-                                       : "it must be finite"));
+  issue(where, filled("'{}' is {} at the values of the parameters; {}", value.text(), *x,
+                      std::isfinite(*x) ? filled("its square must be a number: at most {} is allowed", kLargest)
+                                        : "it must be finite"));
 }
 
 // Accelerations and reactions follow from the forces, so no force may depend on them.
@@ -208,39 +202,14 @@ void Checker::check_sensors_of_state(const std::string& where, const Expression&
   for (const std::string& name : value.names()) {
     const Sensor* const sensor = facts_.sensor(name);
     if (sensor && facts_.reads_of(*sensor) == Reads::motion)
-      issue(where, "uses the sensor '" + name + "', whose quantity is " + sensor->quantity +
-                       ": it follows from the forces, so a force cannot depend on it; sensors of positions, "
-                       "velocities, angles, energies and spring forces can be used");
+      issue(where, filled("uses the sensor '{}', whose quantity is {}: it follows from the forces, so a force cannot "
+                          "depend on it; sensors of positions, velocities, angles, energies and spring forces can be "
+                          "used",
+                          name, sensor->quantity));
   }
 }
 
-void Checker::laws(std::string_view key, const LawVector& values, Scope names, const FieldInfo& info) {
-  for (std::size_t i = 0; i < values.size(); ++i)
-    check_expression(child_path(path(key), i), values[i], names, info.dimension);
-}
-
-void Checker::number(std::string_view key, const Field& value, const FieldInfo& info) {
-  if (info.need != Need::unknown) check_expression(path(key), value, Scope::none, info.dimension);
-}
-
-void Checker::number(std::string_view key, const std::optional<Field>& value, const FieldInfo& info) {
-  if (value) number(key, *value, info);
-}
-
-void Checker::check_vector(const std::string& where, const VectorField& value,
-                           const std::optional<Dimension>& expected) {
-  for (std::size_t i = 0; i < value.size(); ++i)
-    check_expression(child_path(where, i), value[i], Scope::none, expected);
-}
-
-void Checker::vector(std::string_view key, const VectorField& value, const FieldInfo& info) {
-  check_vector(path(key), value, info.dimension);
-}
-
-void Checker::point(std::string_view key, const PointField& value, const std::string& body, const FieldInfo& info) {
-  if (info.need == Need::unknown) return;
-  if (const auto* vector = std::get_if<VectorField>(&value)) return check_vector(path(key), *vector, info.dimension);
-  const std::string& name = std::get<std::string>(value);
+void Checker::named_point(const std::string& where, const std::string& body, const std::string& name) {
   if (name == "O") return;
   const Body* const owner = facts_.body(body);
   if (!owner && body != "ground") return;  // the body is what is wrong
@@ -249,73 +218,49 @@ void Checker::point(std::string_view key, const PointField& value, const std::st
     if (owner->points.contains(name)) return;
     for (const auto& [point, coordinates] : owner->points) known.push_back(point);
   }
-  issue(path(key),
-        "body '" + body + "' has no point '" + name + "'" + did_you_mean(name, known) + listed("points", known));
+  issue(where, filled("body '{}' has no point '{}'", body, name) + did_you_mean(name, known) + listed("points", known));
 }
 
 void Checker::point(std::string_view key, const std::optional<PointField>& value, const std::string& body,
                     const FieldInfo& info) {
   if (value && info.need == Need::unknown)
-    issue(path(key), "is given, and this type does not have it");
+    refuse(key, "is given, and this type does not have it");
   else if (value)
     point(key, *value, body, info);
   else if (info.need == Need::required)
-    issue(path(key), "is missing; expected: " + std::string(info.description));
+    refuse(key, "is missing; expected: {}", info.description);
 }
 
-void Checker::orientation(std::string_view key, const OrientationField& value, const FieldInfo&) {
-  Checker inside = at(key);
-  if (const auto* e = std::get_if<EulerParametersField>(&value)) {
-    for (std::size_t i = 0; i < e->e.size(); ++i)
-      inside.check_expression(child_path(inside.path(), i), e->e[i], Scope::none, Dimension{});
-    check_meaning(inside, *e);
-  } else if (const auto* a = std::get_if<AxisAngleField>(&value)) {
-    inside.check(*a);
-  } else {
-    inside.check(std::get<RollPitchYawField>(value));
-  }
-}
-
-void Checker::points(std::string_view key, const std::map<std::string, VectorField>& value, const FieldInfo& info) {
-  for (const auto& [name, coordinates] : value) {
-    const std::string where = child_path(path(key), name);
-    if (is_identifier(name)) must_be_readable(where, name);
-    if (!is_identifier(name) || name == "O")
-      issue(where, "the name '" + name + "' of a point must be an identifier other than 'O', which is the origin");
-    check_vector(where, coordinates, info.dimension);
-  }
-}
-
-void Checker::law(std::string_view key, const std::optional<Expression>& value, Scope names, const FieldInfo& info) {
-  if (value) expression(key, *value, names, info);
+void Checker::defined_point(const std::string& where, const std::string& name) {
+  if (is_identifier(name)) must_be_readable(where, name);
+  if (!is_identifier(name) || name == "O")
+    issue(where, filled("the name '{}' of a point must be an identifier other than 'O', which is the origin", name));
 }
 
 void Checker::expression(std::string_view key, const Expression& value, Scope names, const FieldInfo& info) {
   // Scope::none here means parameters_only, where weights without units are usual, as in other objectives.
   if (names == Scope::none && !info.dimension) {
-    if (!names_are_known(path(key), value, names)) return;
-    return check_size(path(key), value);
+    if (names_are_known(path(key), value, names)) check_size(path(key), value);
+  } else {
+    check_expression(path(key), value, names, info.dimension);
   }
-  check_expression(path(key), value, names, info.dimension);
 }
 
 void Checker::time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
                        const FieldInfo& info) {
-  Checker inside = at(key);
-  if (samples) {
-    inside.check(*samples);
-    if (info.dimension) check_quantity(inside, *samples, *info.dimension);
-  } else {
-    check_expression(path(key), value, Scope::time_law, info.dimension);
-  }
+  FieldWalk::time_law(key, value, samples, info);
+  if (!samples) return;
+  below(path(key), [&] {
+    check(*samples);
+    if (info.dimension) check_quantity(*this, *samples, *info.dimension);
+  });
 }
 
 void Checker::check_number(const std::string& at, double value, const Range& range) {
   if (!std::isfinite(value))
-    issue(at, "is " + text_of(value) + ", it must be finite");
+    issue(at, filled("is {}, it must be finite", value));
   else if (value < range.least || (range.open && value == range.least))
-    issue(at, "is " + text_of(value) + ", it must be " + (range.open ? "greater than " : "at least ") +
-                  text_of(range.least));
+    issue(at, filled("is {}, it must be {} {}", value, range.open ? "greater than" : "at least", range.least));
 }
 
 void Checker::numbers(std::string_view key, const std::vector<double>& values, const Range& range, const FieldInfo&) {
@@ -333,9 +278,9 @@ void Checker::values_of(std::string_view key, const std::vector<std::pair<std::s
 void Checker::tolerance(std::string_view key, double value, const std::optional<KindTolerances>& kinds,
                         const FieldInfo& info) {
   if (!kinds) return plain(key, value, kPositive, info);
-  at(key).check(*kinds);
+  object(key, kinds, info);
   if (!kinds->position && !kinds->angle && !kinds->velocity && !kinds->rate)
-    issue(path(key), "needs at least one of the tolerances position, angle, velocity and rate");
+    refuse(key, "needs at least one of the tolerances position, angle, velocity and rate");
 }
 
 }  // namespace mbsopt

@@ -1,5 +1,6 @@
-// The visitor (core/scene/vocabulary.hpp) that finds the expressions of an object with their places, its points, and
-// the names of other objects. It serves functions that ask what the object depends on.
+// Visitors (core/scene/vocabulary.hpp) of objects that they do not change. FieldWalk goes through all fields and knows
+// their places. FieldVisitor, made of it, finds the expressions of an object, its points, and the names of other
+// objects. It serves functions that ask what the object depends on.
 #pragma once
 
 #include <string>
@@ -9,6 +10,143 @@
 #include "core/scene/vocabulary.hpp"
 
 namespace mbsopt {
+
+// A visitor derives from FieldWalk<itself>. It gets each expression by formula(path, expression, names, info). It
+// declares again the functions of other fields that it asks for, and left(object), which follows an object's fields.
+template <class Visitor>
+class FieldWalk {
+ public:
+  using Key = std::string_view;
+
+  explicit FieldWalk(std::string path = "") : path_(std::move(path)) {}
+  const std::string& path() const { return path_; }  // of the object whose fields are visited
+  std::string path(Key key) const { return child_path(path_, key); }
+
+  void name(Key, const std::string&, const FieldInfo&) {}
+  void text(Key, const std::string&, const FieldInfo&) {}
+  void texts(Key, const std::vector<std::string>&, const FieldInfo&) {}
+  void reference(Key, const std::string&, ElementKind, const FieldInfo&) {}
+  void references(Key, const std::vector<std::string>&, ElementKind, const FieldInfo&) {}
+  void word(Key, const std::string&, const Words&, const FieldInfo&) {}
+  void choice(Key, const auto&, const auto&, const FieldInfo&) {}
+  void plain(Key, const auto&, const Range&, const FieldInfo&) {}
+  void level(Key, const std::optional<double>&, const auto&, const Range&, const FieldInfo&) {}
+  void instead_of(Key, Key, const Words&) {}
+  void numbers(Key, const std::vector<double>&, const Range&, const FieldInfo&) {}
+  void values_of(Key, const std::vector<std::pair<std::string, double>>&, ElementKind, const Range&, const FieldInfo&) {
+  }
+  void tolerance(Key, double, const std::optional<KindTolerances>&, const FieldInfo&) {}
+  void version(Key, int, const FieldInfo&) {}
+  void misplaced(Key, Key) {}
+  void rest_unknown() {}
+  void named_point(const std::string&, const std::string&, const std::string&) {}  // path, body and name of its point
+  void defined_point(const std::string&, const std::string&) {}                    // path and name
+  void left(const auto&) {}
+
+  const TypeRow* type(Key, Key current, std::span<const TypeRow> rows, const FieldInfo&) {
+    return find_row(rows, current);
+  }
+  void number(Key key, const Field& value, const FieldInfo& info) {
+    if (info.need != Need::unknown) own().formula(path(key), value, Scope::none, info);
+  }
+  void number(Key key, const std::optional<Field>& value, const FieldInfo& info) {
+    if (value) number(key, *value, info);
+  }
+  void vector(Key key, const VectorField& value, const FieldInfo& info) {
+    formulas(path(key), value, Scope::none, info);
+  }
+  void point(Key key, const PointField& value, const std::string& body, const FieldInfo& info) {
+    if (info.need == Need::unknown) return;
+    if (const auto* given = std::get_if<VectorField>(&value))
+      formulas(path(key), *given, Scope::none, info);
+    else
+      own().named_point(path(key), body, std::get<std::string>(value));
+  }
+  void point(Key key, const std::optional<PointField>& value, const std::string& body, const FieldInfo& info) {
+    if (value) point(key, *value, body, info);
+  }
+  void inertia(Key key, const InertiaField& tensor, const std::optional<ConsistentInertiaField>& consistent,
+               const FieldInfo&) {
+    consistent ? visit(child_path(path(key), "consistent"), *consistent) : visit(path(key), tensor);
+  }
+  void orientation(Key key, const OrientationField& value, const FieldInfo&) {
+    std::visit([&](const auto& form) { visit(path(key), form); }, value);
+  }
+  void points(Key key, const std::map<std::string, VectorField>& value, const FieldInfo& info) {
+    for (const auto& [name, coordinates] : value) {
+      own().defined_point(child_path(path(key), name), name);
+      formulas(child_path(path(key), name), coordinates, Scope::none, info);
+    }
+  }
+  void expression(Key key, const Expression& value, Scope names, const FieldInfo& info) {
+    own().formula(path(key), value, names, info);
+  }
+  void expression(Key key, const std::optional<Expression>& value, Scope names, const FieldInfo& info) {
+    if (value) own().expression(key, *value, names, info);
+  }
+  void time_law(Key key, const Expression& value, const std::optional<SampledLaw>& samples, const FieldInfo& info) {
+    if (!samples) own().formula(path(key), value, Scope::time_law, info);
+  }
+  void laws(Key key, const LawVector& values, Scope names, const FieldInfo& info) {
+    formulas(path(key), values, names, info);
+  }
+
+  template <class T>
+  void object(Key key, const T& value, const FieldInfo&) {
+    visit(path(key), value);
+  }
+  template <class T>
+  void object(Key key, const std::optional<T>& value, const FieldInfo&) {
+    if (value) visit(path(key), *value);
+  }
+  void group(Key key, const FieldInfo&, auto&& fields) {
+    below(path(key), [&] { fields(own()); });
+  }
+  void reference_or(Key key, const std::string& value, ElementKind what, const FieldInfo& info, auto&& fields) {
+    own().reference(key, value, what, info);
+    group(key, info, fields);
+  }
+  void list(Key key, const auto& values, const FieldInfo&) {
+    for (std::size_t i = 0; i < values.size(); ++i) visit(child_path(path(key), i), values[i]);
+  }
+  template <class T>
+  void named(Key key, const std::vector<T>& values, const FieldInfo&) {
+    for (const T& value : values) {
+      const std::string place = child_path(path(key), value.name);
+      if constexpr (std::is_same_v<T, Definition> || std::is_same_v<T, TermParameter>)
+        own().formula(place, value.value, Scope::none, {});
+      else
+        visit(place, value);
+    }
+  }
+
+  // Visits an object at this path.
+  void visit(const auto& value) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(value)>, EulerParametersField>)  // a list in the file
+      formulas(path_, value.e, Scope::none, {"", Need::required, Dimension{}});
+    else
+      describe(own(), value);
+    own().left(value);
+  }
+
+ protected:
+  void visit(std::string path, const auto& value) {
+    below(std::move(path), [&] { visit(value); });
+  }
+  void below(std::string path, auto&& visit_fields) {
+    std::swap(path_, path);
+    visit_fields();
+    std::swap(path_, path);
+  }
+  void formulas(const std::string& path, const auto& values, Scope names, const FieldInfo& info) {
+    for (std::size_t i = 0; i < values.size(); ++i) own().formula(child_path(path, i), values[i], names, info);
+  }
+
+ private:
+  Visitor& own() { return static_cast<Visitor&>(*this); }
+
+  std::string path_;
+};
 
 struct FieldPlace {
   const std::string& path;  // "bodies[2].mass", below the path that the visit began at
@@ -20,141 +158,49 @@ struct FieldPlace {
 // name) for points that are used by name, and on_reference(To, const std::string& name). Definitions are left out: they
 // count where they are used.
 template <class OnExpression, class OnPoint, class OnReference = decltype([](ElementKind, const std::string&) {})>
-class FieldVisitor {
+class FieldVisitor : public FieldWalk<FieldVisitor<OnExpression, OnPoint, OnReference>> {
+  using Walk = FieldWalk<FieldVisitor>;
+  using Key = std::string_view;
+
  public:
   FieldVisitor(OnExpression on_expression, OnPoint on_point, OnReference on_reference = {})
       : on_expression_(std::move(on_expression)),
         on_point_(std::move(on_point)),
         on_reference_(std::move(on_reference)) {}
 
-  void name(std::string_view, const std::string&, const FieldInfo&) {}
-  void text(std::string_view, const std::string&, const FieldInfo&) {}
-  void texts(std::string_view, const std::vector<std::string>&, const FieldInfo&) {}
-  void reference(std::string_view, const std::string& name, ElementKind to, const FieldInfo& info) {
+  void formula(const std::string& path, const Expression& value, Scope names, const FieldInfo&) {
+    on_expression_(FieldPlace{path, in_named_point_, in_drawing_}, value, names);
+  }
+  void reference(Key, const std::string& name, ElementKind to, const FieldInfo& info) {
     if (info.need != Need::unknown) on_reference_(to, name);
   }
-  void references(std::string_view, const std::vector<std::string>& names, ElementKind to, const FieldInfo&) {
+  void references(Key, const std::vector<std::string>& names, ElementKind to, const FieldInfo&) {
     for (const std::string& name : names) on_reference_(to, name);
   }
-  void reference_or(std::string_view, const std::string&, ElementKind, const FieldInfo&, auto&&) {}
-  void word(std::string_view, const std::string&, const Words&, const FieldInfo&) {}
-  template <class T, std::size_t N>
-  void choice(std::string_view, const T&, const Choice<T> (&)[N], const FieldInfo&) {}
-  const TypeRow* type(std::string_view, std::string_view current, std::span<const TypeRow> rows, const FieldInfo&) {
-    return find_row(rows, current);
+  void reference_or(Key, const std::string&, ElementKind, const FieldInfo&, auto&&) {}
+  void named_point(const std::string&, const std::string& body, const std::string& name) {
+    if (!in_drawing_) on_point_(body, name);
   }
-  void number(std::string_view key, const Field& value, const FieldInfo& info) {
-    if (info.need != Need::unknown) tell(at(key), value, Scope::none);
-  }
-  void number(std::string_view key, const std::optional<Field>& value, const FieldInfo&) {
-    if (value) tell(at(key), *value, Scope::none);
-  }
-  void vector(std::string_view key, const VectorField& value, const FieldInfo&) {
-    tell_all(at(key), value, Scope::none);
-  }
-  void point(std::string_view key, const PointField& value, const std::string& body, const FieldInfo& info) {
-    if (info.need == Need::unknown) return;
-    if (const auto* given = std::get_if<VectorField>(&value))
-      tell_all(at(key), *given, Scope::none);
-    else if (!in_drawing_)
-      on_point_(body, std::get<std::string>(value));
-  }
-  void point(std::string_view key, const std::optional<PointField>& value, const std::string& body,
-             const FieldInfo& info) {
-    if (value) point(key, *value, body, info);
-  }
-  void inertia(std::string_view key, const InertiaField& tensor,
-               const std::optional<ConsistentInertiaField>& consistent, const FieldInfo&) {
-    if (consistent)
-      visit(child_path(at(key), "consistent"), *consistent);
-    else
-      visit(at(key), tensor);
-  }
-  void orientation(std::string_view key, const OrientationField& value, const FieldInfo&) {
-    if (const auto* e = std::get_if<EulerParametersField>(&value))
-      tell_all(at(key), e->e, Scope::none);
-    else if (const auto* a = std::get_if<AxisAngleField>(&value))
-      visit(at(key), *a);
-    else
-      visit(at(key), std::get<RollPitchYawField>(value));
-  }
-  void points(std::string_view key, const std::map<std::string, VectorField>& value, const FieldInfo&) {
+  void points(Key key, const std::map<std::string, VectorField>& value, const FieldInfo& info) {
     in_named_point_ = true;
-    for (const auto& [name, coordinates] : value) tell_all(child_path(at(key), name), coordinates, Scope::none);
+    Walk::points(key, value, info);
     in_named_point_ = false;
   }
-  void law(std::string_view key, const std::optional<Expression>& value, Scope names, const FieldInfo&) {
-    if (value) tell(at(key), *value, names);
-  }
-  void expression(std::string_view key, const Expression& value, Scope names, const FieldInfo&) {
-    tell(at(key), value, names);
-  }
-  void time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
-                const FieldInfo&) {
-    if (!samples) tell(at(key), value, Scope::time_law);
-  }
-  void laws(std::string_view key, const LawVector& values, Scope names, const FieldInfo&) {
-    tell_all(at(key), values, names);
-  }
-  void plain(std::string_view, const auto&, const Range&, const FieldInfo&) {}
-  template <std::size_t N>
-  void level(std::string_view, const std::optional<double>&, const Choice<double> (&)[N], const Range&,
-             const FieldInfo&) {}
-  void instead_of(std::string_view, std::string_view, const Words&) {}
-  void numbers(std::string_view, const std::vector<double>&, const Range&, const FieldInfo&) {}
-  void values_of(std::string_view, const std::vector<std::pair<std::string, double>>&, ElementKind, const Range&,
-                 const FieldInfo&) {}
-  void tolerance(std::string_view, double, const std::optional<KindTolerances>&, const FieldInfo&) {}
   template <class T>
-  void object(std::string_view key, const T& value, const FieldInfo&) {
-    visit(at(key), value);
-  }
-  template <class T>
-  void object(std::string_view key, const std::optional<T>& value, const FieldInfo&) {
-    if (value) visit(at(key), *value);
-  }
-  void group(std::string_view key, const FieldInfo&, auto&& fields) {
-    below(at(key), [&] { fields(*this); });
-  }
-  template <class T>
-  void list(std::string_view key, const std::vector<T>& values, const FieldInfo&) {
+  void list(Key key, const std::vector<T>& values, const FieldInfo& info) {
     in_drawing_ = std::is_same_v<T, Shape>;
-    for (std::size_t i = 0; i < values.size(); ++i) visit(child_path(at(key), i), values[i]);
+    Walk::list(key, values, info);
     in_drawing_ = false;
   }
   template <class T>
-  void named(std::string_view key, const std::vector<T>& values, const FieldInfo&) {
-    if constexpr (std::is_same_v<T, TermParameter>)
-      for (const T& value : values) tell(child_path(at(key), value.name), value.value, Scope::none);
-    else if constexpr (!std::is_same_v<T, Definition>)
-      for (const T& value : values) visit(child_path(at(key), value.name), value);
+  void named(Key key, const std::vector<T>& values, const FieldInfo& info) {
+    if constexpr (!std::is_same_v<T, Definition>) Walk::named(key, values, info);
   }
-  void version(std::string_view, int, const FieldInfo&) {}
-  void misplaced(std::string_view, std::string_view) {}
-  void rest_unknown() {}
 
  private:
-  std::string at(std::string_view key) const { return child_path(path_, key); }
-  void tell(const std::string& path, const Expression& value, Scope names) {
-    on_expression_(FieldPlace{path, in_named_point_, in_drawing_}, value, names);
-  }
-  void tell_all(const std::string& path, const auto& values, Scope names) {
-    for (std::size_t i = 0; i < values.size(); ++i) tell(child_path(path, i), values[i], names);
-  }
-  void below(std::string path, auto&& tell_fields) {
-    std::swap(path_, path);
-    tell_fields();
-    std::swap(path_, path);
-  }
-  template <class T>
-  void visit(std::string path, const T& value) {
-    below(std::move(path), [&] { describe(*this, value); });
-  }
-
   OnExpression on_expression_;
   OnPoint on_point_;
   OnReference on_reference_;
-  std::string path_;
   bool in_named_point_ = false, in_drawing_ = false;
 };
 

@@ -1,5 +1,6 @@
 #include "core/scene/issues.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -16,21 +17,16 @@ namespace mbsopt {
 
 namespace {
 
-using Vector = std::array<double, 3>;
-
-double norm(const Vector& v) { return std::hypot(v[0], v[1], v[2]); }
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-bool is_finite(const Vector& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
-Vector unit(const Vector& v) { return {v[0] / norm(v), v[1] / norm(v), v[2] / norm(v)}; }
+using Eigen::Vector3d;
 
 // Returns a usable direction, and reports a zero vector.
-std::optional<Vector> direction(Checker& checker, std::string_view key, const std::optional<PointField>& field,
-                                const std::string& body) {
+std::optional<Vector3d> direction(Checker& checker, std::string_view key, const std::optional<PointField>& field,
+                                  const std::string& body) {
   if (!field) return std::nullopt;
   const auto v = checker.facts().value(*field, body);
-  if (!v || !is_finite(*v)) return std::nullopt;
-  if (norm(*v) > 0) return unit(*v);
-  checker.issue(checker.path(key), "is a zero vector, a direction must not be");
+  if (!v || !Vector3d::Map(v->data()).allFinite()) return std::nullopt;
+  if (const double norm = std::hypot((*v)[0], (*v)[1], (*v)[2]); norm > 0) return Vector3d::Map(v->data()) / norm;
+  checker.refuse(key, "is a zero vector, a direction must not be");
   return std::nullopt;
 }
 
@@ -51,44 +47,38 @@ bool angle_is_used(const Scene& scene, const std::string& joint, const std::stri
   return false;
 }
 
-void check_normals(Checker& checker, const Joint& joint, const std::optional<Vector>& axis1,
-                   const std::optional<Vector>& axis2) {
+void check_normals(Checker& checker, const Joint& joint, const std::optional<Vector3d>& axis1,
+                   const std::optional<Vector3d>& axis2) {
   const auto normal1 = direction(checker, "normal1", joint.normal1, joint.body1);
   const auto normal2 = direction(checker, "normal2", joint.normal2, joint.body2);
   constexpr double kParallel = 1e-9, kSame = 1e-12;
-  const auto check_angle = [&](std::string_view key, const std::optional<Vector>& n, const std::optional<Vector>& a) {
-    if (n && a && 1 - std::abs(dot(*n, *a)) < kParallel * kParallel)
-      checker.issue(checker.path(key), "is parallel to the axis; it must have a part perpendicular to it");
+  const auto check_angle = [&](std::string_view key, const std::optional<Vector3d>& n,
+                               const std::optional<Vector3d>& a) {
+    if (n && a && 1 - std::abs(n->dot(*a)) < kParallel * kParallel)
+      checker.refuse(key, "is parallel to the axis; it must have a part perpendicular to it");
   };
   check_angle("normal1", normal1, axis1);
   check_angle("normal2", normal2, axis2);
   if (joint.normal1.has_value() != joint.normal2.has_value())
-    checker.issue(checker.path(joint.normal1 ? "normal2" : "normal1"), "is missing; give both normals, or neither");
+    checker.refuse(joint.normal1 ? "normal2" : "normal1", "is missing; give both normals, or neither");
   if (joint.normal1 || joint.normal2 || !axis1 || !axis2) return;
-  const Vector difference{(*axis1)[0] - (*axis2)[0], (*axis1)[1] - (*axis2)[1], (*axis1)[2] - (*axis2)[2]};
-  if (norm(difference) > kSame && angle_is_used(checker.facts().scene(), joint.name, joint.type))
-    checker.issue(checker.path(),
-                  "its angle is used and axis1 differs from axis2: make them equal, or give normal1 and normal2");
+  if ((*axis1 - *axis2).norm() > kSame && angle_is_used(checker.facts().scene(), joint.name, joint.type))
+    checker.refuse("", "its angle is used and axis1 differs from axis2: make them equal, or give normal1 and normal2");
 }
 
 void check_joint_has(Checker& checker, std::string_view key, const std::string& name, std::string_view what) {
+  const std::string_view joints = what == "angle" ? kJointsWithAngle : kJointsWithDisplacement;
   const Joint* const joint = checker.facts().joint(name);
-  if (!joint || !find_row(kJointTypes, joint->type)) return;
-  if (has_word(what == "angle" ? kJointsWithAngle : kJointsWithDisplacement, joint->type)) return;
-  checker.issue(checker.path(key), "joint '" + name + "' is " + joint->type + " and has no " + std::string(what) +
-                                       "; joints that have one: " +
-                                       joined(words(what == "angle" ? kJointsWithAngle : kJointsWithDisplacement)));
-}
-void check_joint_has_angle(Checker& checker, const std::string& name) {
-  check_joint_has(checker, "joint", name, "angle");
+  if (!joint || !find_row(kJointTypes, joint->type) || has_word(joints, joint->type)) return;
+  checker.refuse(key, "joint '{}' is {} and has no {}; joints that have one: {}", name, joint->type, what,
+                 joined(words(joints)));
 }
 
 void check_two_bodies(Checker& checker, const std::string& body1, const std::string& body2, std::string_view what) {
-  if (!body2.empty() && body1 == body2)
-    checker.issue(checker.path("body2"), "is '" + body2 + "' like body1; " + std::string(what) + " needs two bodies");
+  if (!body2.empty() && body1 == body2) checker.refuse("body2", "is '{}' like body1; {} needs two bodies", body2, what);
 }
 
-void check_friction(Checker& checker, const FrictionSpec& friction) {
+void check_kind(Checker& checker, const FrictionSpec& friction) {
   using namespace dimension;
   const Joint* const joint = checker.facts().joint(friction.joint);
   const bool slides = joint && is_sliding(friction.motion, joint->type);
@@ -102,11 +92,11 @@ void check_friction(Checker& checker, const FrictionSpec& friction) {
   check("breakaway", friction.breakaway, kTorque, kForce);
   check("stribeck_velocity", friction.stribeck_velocity, kRate, kVelocity);
   if (friction.breakaway.has_value() != friction.stribeck_velocity.has_value())
-    checker.issue(checker.path(friction.breakaway ? "stribeck_velocity" : "breakaway"),
-                  "is missing; give breakaway and stribeck_velocity, or neither");
+    checker.refuse(friction.breakaway ? "stribeck_velocity" : "breakaway",
+                   "is missing; give breakaway and stribeck_velocity, or neither");
   const auto check_above_zero = [&](std::string_view key, const Field& field) {
     const std::optional<double> rate = checker.facts().value(field);
-    if (rate && *rate <= 0) checker.issue(checker.path(key), "is " + text_of(*rate) + ", it must be greater than 0");
+    if (rate && *rate <= 0) checker.refuse(key, "is {}, it must be greater than 0", *rate);
   };
   check_above_zero("smooth_velocity", friction.smooth_velocity);
   if (friction.stribeck_velocity) check_above_zero("stribeck_velocity", *friction.stribeck_velocity);
@@ -124,14 +114,23 @@ void check_gyration(Checker& checker, const Body& body) {
   if (!(mass > 0 && largest > 0)) return;
   const double radius = std::sqrt(largest / mass), extent = checker.facts().scale().length;
   if (extent == 0 || radius <= kFactor * extent || mass < kNearlyMassless * checker.facts().scale().mass) return;
-  checker.warning(checker.path("inertia"), "is " + text_of(largest) + " kg m^2, a radius of gyration of " +
-                                               std::to_string(radius) + " m, in a mechanism within " + text_of(extent) +
-                                               " m: is it in kg mm^2? Write the unit, as in \"" + text_of(largest) +
-                                               " [kg mm^2]\"");
+  checker.warn("inertia",
+               "is {0} kg m^2, a radius of gyration of {1} m, in a mechanism within {2} m: is it in kg mm^2? Write the "
+               "unit, as in \"{0} [kg mm^2]\"",
+               largest, std::to_string(radius), extent);
 }
 
 void check_moving(Checker& checker, const std::string& body) {
-  if (body == "ground") checker.issue(checker.path("body"), "is the ground, which never moves");
+  if (body == "ground") checker.refuse("body", "is the ground, which never moves");
+}
+
+// Returns nothing if the text is empty, and reports a unit that is not known.
+std::optional<Unit> known_unit(Checker& checker, std::string_view key, const std::string& text) {
+  const std::optional<Unit> unit = text.empty() ? std::nullopt : parse_unit(text);
+  if (!unit && !text.empty())
+    checker.refuse(key, "'{}' is not a known unit; units are products, quotients and whole powers of {}", text,
+                   known_units());
+  return unit;
 }
 
 // Parameters, definitions, signals and sensors share one name space.
@@ -142,8 +141,9 @@ void check_shared_names(Checker& checker, const Scene& scene) {
     checker.must_be_identifier(where, name);
     const auto [it, is_new] = first.emplace(name, where);
     if (!is_new)
-      checker.issue(where, "the name '" + name + "' is taken by " + it->second +
-                               "; parameters, definitions, signals and sensors share one name space");
+      checker.issue(where, filled("the name '{}' is taken by {}; parameters, definitions, signals and sensors share "
+                                  "one name space",
+                                  name, it->second));
   };
   for (const Parameter& parameter : scene.parameters) check("parameters", parameter.name);
   for (const Definition& definition : scene.definitions) check("definitions", definition.name);
@@ -155,39 +155,29 @@ void check_shared_names(Checker& checker, const Scene& scene) {
 
 void check_meaning(Checker& checker, const Parameter& parameter) {
   const auto [value, lower, upper] = std::tuple(parameter.value, parameter.lower, parameter.upper);
-  if (!std::isfinite(value))
-    return checker.issue(checker.path("value"), "is " + text_of(value) + "; it must be finite");
+  if (!std::isfinite(value)) return checker.refuse("value", "is {}; it must be finite", value);
   if (lower && upper && *lower > *upper)
-    checker.issue(checker.path("lower"), "is " + text_of(*lower) + ", above the upper bound " + text_of(*upper));
+    checker.refuse("lower", "is {}, above the upper bound {}", *lower, *upper);
   else if (lower && value < *lower)
-    checker.issue(checker.path("value"), "is " + text_of(value) + ", below the lower bound " + text_of(*lower));
+    checker.refuse("value", "is {}, below the lower bound {}", value, *lower);
   else if (upper && value > *upper)
-    checker.issue(checker.path("value"), "is " + text_of(value) + ", above the upper bound " + text_of(*upper));
+    checker.refuse("value", "is {}, above the upper bound {}", value, *upper);
   if (parameter.scale != ParameterScale::linear) {
-    if (value <= 0)
-      checker.issue(checker.path("value"), "is " + text_of(value) + "; a logarithmic scale needs it positive");
-    if (lower && *lower <= 0)
-      checker.issue(checker.path("lower"), "is " + text_of(*lower) + "; a logarithmic scale needs it positive");
+    if (value <= 0) checker.refuse("value", "is {}; a logarithmic scale needs it positive", value);
+    if (lower && *lower <= 0) checker.refuse("lower", "is {}; a logarithmic scale needs it positive", *lower);
   }
-  if (parameter.unit.empty()) return;
-  const std::optional<Unit> unit = parse_unit(parameter.unit);
-  if (!unit)
-    checker.issue(checker.path("unit"), "'" + parameter.unit +
-                                            "' is not a known unit; units are products, quotients and "
-                                            "whole powers of " +
-                                            known_units());
-  else if (unit->to_si != 1)
-    checker.issue(checker.path("unit"), "'" + parameter.unit + "' is not SI, and values are; give the unit as '" +
-                                            to_string(unit->dimension) +
-                                            "', or write it behind the value, as in \"1 [" + parameter.unit +
-                                            "]\", without \"unit\"");
+  const std::optional<Unit> unit = known_unit(checker, "unit", parameter.unit);
+  if (unit && unit->to_si != 1)
+    checker.refuse("unit",
+                   "'{0}' is not SI, and values are; give the unit as '{1}', or write it behind the value, as in \"1 "
+                   "[{0}]\", without \"unit\"",
+                   parameter.unit, to_string(unit->dimension));
 }
 
 void check_meaning(Checker& checker, const Body& body) {
-  if (body.name == "ground") checker.issue(checker.path("name"), "is 'ground', which is predefined; take another name");
+  if (body.name == "ground") checker.refuse("name", "is 'ground', which is predefined; take another name");
   const std::optional<double> mass = checker.facts().value(body.mass);
-  if (mass && *mass < 0)
-    checker.issue(checker.path("mass"), "is " + text_of(*mass) + " kg, a mass must not be negative");
+  if (mass && *mass < 0) checker.refuse("mass", "is {} kg, a mass must not be negative", *mass);
   check_gyration(checker, body);
 }
 
@@ -213,7 +203,7 @@ void check_meaning(Checker& checker, const EulerParametersField& orientation) {
     norm = std::hypot(norm, *e);  // squares might overflow
   }
   if (std::abs(norm - 1) > kTolerance)
-    checker.issue(checker.path(), "Euler parameters of norm " + text_of(norm) + "; it must be 1 within 1e-6");
+    checker.refuse("", "Euler parameters of norm {}; it must be 1 within 1e-6", norm);
 }
 
 void check_meaning(Checker& checker, const AxisAngleField& orientation) {
@@ -227,50 +217,42 @@ void check_meaning(Checker& checker, const Joint& joint) {
     check_joint_has(checker, "joint1", joint.joint1, "angle");
     check_joint_has(checker, "joint2", joint.joint2, joint.type == "gear" ? "angle" : "displacement");
     if (!joint.joint2.empty() && joint.joint1 == joint.joint2)
-      checker.issue(checker.path("joint2"), "is '" + joint.joint2 + "' like joint1; two joints are needed");
+      checker.refuse("joint2", "is '{}' like joint1; two joints are needed", joint.joint2);
     return;
   }
   check_two_bodies(checker, joint.body1, joint.body2, "a joint");
   if (const auto length = checker.facts().value(joint.length); joint.type == "distance" && length && *length <= 0)
-    checker.issue(checker.path("length"), "is " + text_of(*length) + " m, the length of a rod must be greater than 0");
+    checker.refuse("length", "is {} m, the length of a rod must be greater than 0", *length);
   const auto axis1 = direction(checker, "axis1", joint.axis1, joint.body1);
   const auto axis2 = direction(checker, "axis2", joint.axis2, joint.body2);
-  if (need_of(*row, "normal1") != Need::unknown) check_normals(checker, joint, axis1, axis2);
+  if ((*row)["normal1"] != Need::unknown) check_normals(checker, joint, axis1, axis2);
 }
 
 // Checks that a law of time alone, and its first `derivatives` derivatives, are finite at the start.
 void check_start(Checker& checker, const std::string& where, const Expression& law, std::size_t derivatives) {
-  static constexpr const char* kOf[] = {"", "the rate of ", "the second derivative of "};
+  static constexpr std::string_view kOf[] = {"", "the rate of ", "the second derivative of "};
   const double start = checker.facts().scene().simulation.start_time;
   const auto values = checker.facts().law_at(law, start);
   for (std::size_t k = 0; values && k <= derivatives; ++k) {
     if (std::isfinite((*values)[k])) continue;
-    return checker.issue(where, kOf[k] + ("'" + law.text()) + "' is " + text_of((*values)[k]) + " at the start, t = " +
-                                    text_of(start) + " s; it must be finite from there to the end (a root, logarithm " +
-                                    "or division outside its range?)");
+    return checker.issue(where,
+                         filled("{}'{}' is {} at the start, t = {} s; it must be finite from there to the end (a "
+                                "root, logarithm or division outside its range?)",
+                                kOf[k], law.text(), (*values)[k], start));
   }
 }
 
 void check_units(Checker& checker, const SampleColumn& samples) {
-  const auto check = [&](std::string_view key, const std::string& unit, const std::optional<Dimension>& expected) {
-    const std::optional<Unit> found = parse_unit(unit);
-    if (unit.empty()) return;
-    if (!found)
-      checker.issue(checker.path(key), "'" + unit +
-                                           "' is not a known unit; units are products, quotients and whole "
-                                           "powers of " +
-                                           known_units());
-    else if (expected && !compatible(found->dimension, *expected))
-      checker.issue(checker.path(key), "'" + unit + "' is no unit of time");
-  };
-  check("unit", samples.unit, std::nullopt);
-  check("time_unit", samples.time_unit, dimension::kTime);
+  known_unit(checker, "unit", samples.unit);
+  const std::optional<Unit> of_time = known_unit(checker, "time_unit", samples.time_unit);
+  if (of_time && !compatible(of_time->dimension, dimension::kTime))
+    checker.refuse("time_unit", "'{}' is no unit of time", samples.time_unit);
 }
 
 namespace {
 
 // Warns of samples of an angle that are not counted over turns.
-void check_turns(Checker& checker, const SampleColumn& samples, const std::string& path) {
+void check_turns(Checker& checker, const SampleColumn& samples, std::string_view key) {
   if (!samples.curve) return;
   const std::optional<Unit> unit = parse_unit(samples.unit);
   const std::vector<double>& values = samples.curve->y();
@@ -278,11 +260,11 @@ void check_turns(Checker& checker, const SampleColumn& samples, const std::strin
   std::size_t wrap = first_wrap(values, 2 * std::numbers::pi);
   const bool in_degrees = wrap == 0 && !in_rad && (wrap = first_wrap(values, 360)) > 0;
   if (wrap == 0) return;
-  checker.warning(path, "'" + samples.column + "' jumps from " + text_of(values[wrap - 1]) + " to " +
-                            text_of(values[wrap]) + " at " + text_of(samples.curve->x()[wrap]) + " s, by about a turn" +
-                            (in_degrees ? " in degrees, where rad are expected" : "") +
-                            ": the motion turns back there. Take whole turns out of the column, so that it goes on "
-                            "counting");
+  checker.warn(key,
+               "'{}' jumps from {} to {} at {} s, by about a turn{}: the motion turns back there. Take whole turns out "
+               "of the column, so that it goes on counting",
+               samples.column, values[wrap - 1], values[wrap], samples.curve->x()[wrap],
+               in_degrees ? " in degrees, where rad are expected" : "");
 }
 
 }  // namespace
@@ -290,10 +272,9 @@ void check_turns(Checker& checker, const SampleColumn& samples, const std::strin
 void check_quantity(Checker& checker, const SampleColumn& samples, const Dimension& quantity) {
   const std::optional<Unit> unit = parse_unit(samples.unit);
   if (!samples.unit.empty() && unit && !unit->dimension.is_none() && !compatible(unit->dimension, quantity))
-    return checker.issue(checker.path("column"), "'" + samples.column + "' is in " + to_string(unit->dimension) +
-                                                     "; expected is " +
-                                                     (quantity.is_none() ? "a number" : to_string(quantity)));
-  if (quantity == dimension::kAngle) check_turns(checker, samples, checker.path("column"));
+    return checker.refuse("column", "'{}' is in {}; expected is {}", samples.column, to_string(unit->dimension),
+                          quantity.is_none() ? "a number" : to_string(quantity));
+  if (quantity == dimension::kAngle) check_turns(checker, samples, "column");
 }
 
 void check_meaning(Checker& checker, const SampledLaw& law) { check_units(checker, law); }
@@ -307,15 +288,14 @@ namespace {
 
 // Reports kinks of a drive's law: no motion follows a rate that jumps.
 void check_smooth(Checker& checker, const Expression& law) {
-  const std::string needs = "; a drive needs two continuous derivatives: take ";
+  constexpr std::string_view kNeeds = "; a drive needs two continuous derivatives: take ";
   for (const Signal& signal : checker.facts().scene().signals)
     if (law.depends_on(signal.name) && signal.interpolation != Interpolation::spline)
-      checker.issue(checker.path("law"), "uses the signal '" + signal.name + "', which " +
-                                             (signal.interpolation == Interpolation::hold ? "jumps" : "has kinks") +
-                                             " at its samples" + needs + "\"interpolation\": \"spline\"");
+      checker.refuse("law", "uses the signal '{}', which {} at its samples{}\"interpolation\": \"spline\"", signal.name,
+                     signal.interpolation == Interpolation::hold ? "jumps" : "has kinks", kNeeds);
   for (const SyntaxNode& node : law.tree().nodes) {
     if (!node.curve || node.curve->interpolation() == Interpolation::spline) continue;
-    return checker.issue(checker.path("law"), "has a table, which has kinks" + needs + "spline(x, [..], [..])");
+    return checker.refuse("law", "has a table, which has kinks{}spline(x, [..], [..])", kNeeds);
   }
 }
 
@@ -325,75 +305,78 @@ void check_meaning(Checker& checker, const Drive& drive) {
   check_smooth(checker, drive.law);
   for (const Signal& signal : checker.facts().scene().signals)
     if (drive.type == "angle" && signal.unit.empty() && drive.law.depends_on(signal.name))
-      check_turns(checker, signal, checker.path("law"));
+      check_turns(checker, signal, "law");
   if (!drive.samples) check_start(checker, checker.path("law"), drive.law, 2);
   if (drive.type == "angle" || drive.type == "displacement") check_joint_has(checker, "joint", drive.joint, drive.type);
   if (drive.type == "distance") check_two_bodies(checker, drive.body1, drive.body2, "a distance");
-  if (drive.type == "coordinate" && drive.body == "ground")
-    checker.issue(checker.path("body"), "is the ground, which never moves");
+  if (drive.type == "coordinate") check_moving(checker, drive.body);
 }
 
-void check_meaning(Checker& checker, const Force& force) {
-  const auto check_law = [&](const std::optional<Expression>& law) {
-    if (law) check_start(checker, checker.path("law"), *law, 0);
-  };
-  const auto check_components = [&](const auto& components) {
-    for (std::size_t i = 0; i < 3; ++i)
-      check_start(checker, child_path(checker.path("components"), i), components[i], 0);
-  };
-  // Warns of a coefficient beside a law, which has no effect. A coefficient of 0 needs no warning.
-  const auto warn_of_law = [&](bool has_law, std::initializer_list<std::pair<const char*, const Field*>> coefficients) {
-    std::vector<std::string> idle;
-    for (const auto& [key, field] : coefficients)
-      if (has_law && !(field->is_number() && field->number() == 0)) idle.emplace_back(key);
-    if (!idle.empty())
-      checker.warning(checker.path("law"),
-                      "replaces the coefficients of this force: " + joined(idle) + ", given beside it, will not act");
-  };
-  const auto warn_of_feeding = [&](bool has_law, const Field& damping) {
-    if (has_law) return;
-    const auto value = checker.facts().value(damping);
-    if (value && *value < 0)
-      checker.warning(checker.path("damping"), "is " + text_of(*value) +
-                                                   ": it feeds energy into the motion, which may grow without "
-                                                   "bounds; a damper has a positive one");
-  };
-  const auto check_torsion = [&](const auto& f) {
-    check_law(f.law);
-    warn_of_feeding(f.law.has_value(), f.damping);
-    warn_of_law(f.law.has_value(),
-                {{"stiffness", &f.stiffness}, {"damping", &f.damping}, {"free_angle", &f.free_angle}});
-  };
-  if (const auto* tsda = std::get_if<Tsda>(&force.kind)) {
-    check_two_bodies(checker, tsda->body1, tsda->body2, "a tsda");
-    check_law(tsda->law);
-    warn_of_feeding(tsda->law.has_value(), tsda->damping);
-    warn_of_law(tsda->law.has_value(), {{"stiffness", &tsda->stiffness},
-                                        {"damping", &tsda->damping},
-                                        {"free_length", &tsda->free_length},
-                                        {"actuator", &tsda->actuator}});
-  } else if (const auto* rsda = std::get_if<Rsda>(&force.kind)) {
-    check_joint_has_angle(checker, rsda->joint);
-    check_torsion(*rsda);
-  } else if (const auto* bar = std::get_if<TorsionBar>(&force.kind)) {
-    check_two_bodies(checker, bar->body1, bar->body2, "a torsion_bar");
-    direction(checker, "axis", bar->axis, bar->body1);
-    check_torsion(*bar);
-  } else if (const auto* applied = std::get_if<PointForce>(&force.kind)) {
-    check_moving(checker, applied->body);
-    check_components(applied->components);
-  } else if (const auto* torque = std::get_if<Torque>(&force.kind)) {
-    check_moving(checker, torque->body);
-    check_components(torque->components);
-  } else if (const auto* bushing = std::get_if<BushingSpec>(&force.kind)) {
-    check_two_bodies(checker, bushing->body1, bushing->body2, "a bushing");
-  } else if (const auto* friction = std::get_if<FrictionSpec>(&force.kind)) {
-    check_friction(checker, *friction);
-  } else if (const auto* user = std::get_if<UserForceSpec>(&force.kind)) {
-    for (std::size_t i = 0; i < user->bodies.size(); ++i)
-      if (user->bodies[i] == "ground")
-        checker.issue(child_path(checker.path("bodies"), i), "is the ground, which never moves");
+namespace {
+
+// Checks a law, and warns of coefficients beside it, which have no effect. Coefficients of 0 need no warning. Without
+// a law, it warns of a damping that feeds the motion.
+void check_law(Checker& checker, const auto& f,
+               std::initializer_list<std::pair<const char*, const Field*>> coefficients) {
+  if (!f.law) {
+    if (const auto value = checker.facts().value(f.damping); value && *value < 0)
+      checker.warn("damping",
+                   "is {}: it feeds energy into the motion, which may grow without bounds; a damper has a positive one",
+                   *value);
+    return;
   }
+  check_start(checker, checker.path("law"), *f.law, 0);
+  std::vector<std::string> idle;
+  for (const auto& [key, field] : coefficients)
+    if (!(field->is_number() && field->number() == 0)) idle.emplace_back(key);
+  if (!idle.empty())
+    checker.warn("law", "replaces the coefficients of this force: {}, given beside it, will not act", joined(idle));
+}
+
+void check_torsion(Checker& checker, const auto& f) {
+  check_law(checker, f, {{"stiffness", &f.stiffness}, {"damping", &f.damping}, {"free_angle", &f.free_angle}});
+}
+
+void check_kind(Checker& checker, const Tsda& f) {
+  check_two_bodies(checker, f.body1, f.body2, "a tsda");
+  check_law(checker, f,
+            {{"stiffness", &f.stiffness},
+             {"damping", &f.damping},
+             {"free_length", &f.free_length},
+             {"actuator", &f.actuator}});
+}
+
+void check_kind(Checker& checker, const Rsda& f) {
+  check_joint_has(checker, "joint", f.joint, "angle");
+  check_torsion(checker, f);
+}
+
+void check_kind(Checker& checker, const TorsionBar& f) {
+  check_two_bodies(checker, f.body1, f.body2, "a torsion_bar");
+  direction(checker, "axis", f.axis, f.body1);
+  check_torsion(checker, f);
+}
+
+template <class Applied>  // PointForce or Torque
+requires std::same_as<decltype(Applied::components), LawVector>
+void check_kind(Checker& checker, const Applied& f) {
+  check_moving(checker, f.body);
+  for (std::size_t i = 0; i < f.components.size(); ++i)
+    check_start(checker, child_path(checker.path("components"), i), f.components[i], 0);
+}
+
+void check_kind(Checker& checker, const BushingSpec& f) { check_two_bodies(checker, f.body1, f.body2, "a bushing"); }
+
+void check_kind(Checker& checker, const UserForceSpec& f) {
+  for (std::size_t i = 0; i < f.bodies.size(); ++i)
+    if (f.bodies[i] == "ground")
+      checker.issue(child_path(checker.path("bodies"), i), "is the ground, which never moves");
+}
+
+}  // namespace
+
+void check_meaning(Checker& checker, const Force& force) {
+  std::visit([&](const auto& kind) { check_kind(checker, kind); }, force.kind);
 }
 
 void check_meaning(Checker& checker, const Sensor& sensor) {
@@ -401,59 +384,56 @@ void check_meaning(Checker& checker, const Sensor& sensor) {
   if (!row) return;
   if (sensor.quantity == "reaction") {
     if (const Joint* const joint = checker.facts().joint(sensor.joint); joint && ties_joints(*joint))
-      checker.issue(checker.path("joint"), "joint '" + sensor.joint + "' is " + joint->type +
-                                               ", which has no bodies of its own; name one of the joints that it ties");
-  } else if (need_of(*row, "joint") != Need::unknown)
+      checker.refuse("joint", "joint '{}' is {}, which has no bodies of its own; name one of the joints that it ties",
+                     sensor.joint, joint->type);
+  } else if ((*row)["joint"] != Need::unknown) {
     check_joint_has(checker, "joint", sensor.joint, row->dimension == dimension::kLength ? "displacement" : "angle");
-  if (need_of(*row, "body2") != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
-    checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; nothing between them changes");
-  if ((sensor.quantity == "orientation" || sensor.quantity == "body_angle") && sensor.body == "ground")
-    checker.issue(checker.path("body"), "is the ground, whose orientation never changes");
-  direction(checker, "axis", sensor.axis, sensor.body1);
-  if (sensor.quantity == "force") {
-    const Force* const force = checker.facts().force(sensor.force);
-    if (force && type_of(*force) != Tsda::kType && type_of(*force) != Rsda::kType &&
-        type_of(*force) != TorsionBar::kType)
-      checker.issue(checker.path("force"), "'" + sensor.force + "' is a " + std::string(type_of(*force)) +
-                                               "; only a tsda, an rsda or a torsion_bar has one number to measure");
   }
+  if ((*row)["body2"] != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
+    checker.refuse("body2", "is '{}' like body1; nothing between them changes", sensor.body2);
+  if ((sensor.quantity == "orientation" || sensor.quantity == "body_angle") && sensor.body == "ground")
+    checker.refuse("body", "is the ground, whose orientation never changes");
+  direction(checker, "axis", sensor.axis, sensor.body1);
+  if (sensor.quantity != "force") return;
+  const Force* const force = checker.facts().force(sensor.force);
+  if (force && !has_word("tsda rsda torsion_bar", type_of(*force)))
+    checker.refuse("force", "'{}' is a {}; only a tsda, an rsda or a torsion_bar has one number to measure",
+                   sensor.force, type_of(*force));
 }
 
 void check_meaning(Checker& checker, const Condition& condition) {
   if (!condition.value && !condition.rate)
-    checker.issue(checker.path(), "has neither \"value\" nor \"rate\"; at least one is needed");
+    checker.refuse("", "has neither \"value\" nor \"rate\"; at least one is needed");
   const Sensor* const sensor = checker.facts().sensor(condition.sensor);
   if (!sensor || !find_row(kSensorQuantities, sensor->quantity)) return;
-  const std::string named = "sensor '" + sensor->name + "'";
   const Reads reads = checker.facts().reads_of(*sensor);
   if (reads > Reads::velocities)
-    return checker.issue(checker.path("sensor"),
-                         named + (sensor->quantity == "expression"
-                                      ? " is an expression of more than positions, which a condition cannot prescribe; "
-                                        "use expressions of positions, angles, distances or Euler parameters"
-                                      : " measures " + sensor->quantity +
-                                            ", which a condition cannot prescribe; use positions, angles, "
-                                            "distances, Euler parameters or their rates"));
+    return checker.refuse(
+        "sensor", "sensor '{}' {}", sensor->name,
+        sensor->quantity == "expression"
+            ? "is an expression of more than positions, which a condition cannot prescribe; use expressions of "
+              "positions, angles, distances or Euler parameters"
+            : filled("measures {}, which a condition cannot prescribe; use positions, angles, distances, Euler "
+                     "parameters or their rates",
+                     sensor->quantity));
   if (condition.rate && reads == Reads::velocities)
-    checker.issue(checker.path("rate"), named + " measures a " + sensor->quantity + ": give its \"value\"");
+    checker.refuse("rate", "sensor '{}' measures a {}: give its \"value\"", sensor->name, sensor->quantity);
   if (condition.rate && sensor->quantity == "position" && sensor->in_body_frame)
-    checker.issue(checker.path("rate"), named + " is in a body's axes, where its rate is not available");
+    checker.refuse("rate", "sensor '{}' is in a body's axes, where its rate is not available", sensor->name);
   const std::optional<Dimension> measured = checker.facts().dimension_of(*sensor);
   if (!measured) return;
-  const auto check_dimension = [&](std::string_view key, const std::optional<Field>& field, const Dimension& expected) {
-    if (field) checker.number(key, *field, {"", Need::optional, expected});
-  };
-  check_dimension("value", condition.value, *measured);
-  check_dimension("rate", condition.rate, *measured / dimension::kTime);
-  check_dimension("acceleration", condition.acceleration, *measured / dimension::kTime / dimension::kTime);
+  const Dimension rate = *measured / dimension::kTime;
+  checker.number("value", condition.value, {"", Need::optional, *measured});
+  checker.number("rate", condition.rate, {"", Need::optional, rate});
+  checker.number("acceleration", condition.acceleration, {"", Need::optional, rate / dimension::kTime});
 }
 
 void check_meaning(Checker& checker, const Scene& scene) {
   checker.must_be_readable("name", scene.name);
   if (scene.name.empty() || scene.name[0] == '.' || scene.name.find_first_of("/\\") != std::string::npos)
-    checker.issue("name", "is '" + scene.name +
-                              "'; it names a folder, so it must not be empty, begin with '.' or "
-                              "contain / \\ or control characters");
+    checker.issue("name", filled("is '{}'; it names a folder, so it must not be empty, begin with '.' or contain / \\ "
+                                 "or control characters",
+                                 scene.name));
   if (scene.bodies.empty()) checker.issue("bodies", "is empty; a mechanism has at least one body besides the ground");
   check_shared_names(checker, scene);
   const auto in_list = [](const char* list) { return [list](std::size_t i) { return child_path(list, i) + ".name"; }; };

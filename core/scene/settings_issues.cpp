@@ -9,16 +9,15 @@ namespace mbsopt {
 
 void check_meaning(Checker& checker, const IntegratorOptions& o) {
   const auto below_one = [&](std::string_view key, const std::optional<double>& value) {
-    if (value && *value >= 1) checker.issue(checker.path(key), "is " + text_of(*value) + ", it must be below 1");
+    if (value && *value >= 1) checker.refuse(key, "is {}, it must be below 1", *value);
   };
   below_one("newton_tolerance", o.newton_tolerance);
   below_one("factor_min", o.factor_min);
   below_one("safety", o.safety);
   constexpr double kLeastGrowth = 1.25;  // implicit methods keep a step that would grow by less than 1.2
   if (o.factor_max && *o.factor_max < kLeastGrowth)
-    checker.issue(checker.path("factor_max"), "is " + text_of(*o.factor_max) +
-                                                  ": steps could hardly grow again; at least " + text_of(kLeastGrowth) +
-                                                  " is allowed");
+    checker.refuse("factor_max", "is {}: steps could hardly grow again; at least {} is allowed", *o.factor_max,
+                   kLeastGrowth);
 }
 
 namespace {
@@ -40,7 +39,7 @@ void check_options(Checker& checker, const IntegratorSettings& settings) {
                           {"newton_iterations", o.newton_iterations.has_value()}};
   const auto refuse = [&](std::span<const Given> options, const std::string& reason) {
     for (const auto& [key, given] : options)
-      if (given) checker.issue(child_path(path, key), "is given, but " + reason + "; leave it out");
+      if (given) checker.issue(child_path(path, key), filled("is given, but {}; leave it out", reason));
   };
   if (settings.step) {
     const std::string fixed = "the step is fixed (step)";
@@ -54,13 +53,11 @@ void check_options(Checker& checker, const IntegratorSettings& settings) {
   } else if (method && !method->implicit()) {
     refuse(newton, settings.type + " is explicit and does not use Newton's method");
   } else if (method && method->gamma) {
-    refuse(newton, "the stages of " + settings.type + " solve linear equations, without Newton's method");
+    refuse(newton, filled("the stages of {} solve linear equations, without Newton's method", settings.type));
   }
-  for (const auto& [key, step] : {std::pair{"initial_step", settings.initial_step}, {"max_step", settings.max_step}}) {
+  for (const auto& [key, step] : {std::pair{"initial_step", settings.initial_step}, {"max_step", settings.max_step}})
     if (o.min_step && step && *o.min_step > *step)
-      checker.issue(child_path(path, "min_step"),
-                    "is " + text_of(*o.min_step) + " s, above " + key + ", " + text_of(*step) + " s");
-  }
+      checker.issue(child_path(path, "min_step"), filled("is {} s, above {}, {} s", *o.min_step, key, *step));
 }
 
 }  // namespace
@@ -69,63 +66,57 @@ void check_meaning(Checker& checker, const IntegratorSettings& settings) {
   check_options(checker, settings);
   const Method* const method = runge_kutta_method(settings.type);
   if (method && !method->adaptive && !settings.step)
-    checker.issue(checker.path("step"),
-                  "is missing; " + settings.type + " has no error estimate and needs a fixed step [s]");
+    checker.refuse("step", "is missing; {} has no error estimate and needs a fixed step [s]", settings.type);
   if (has_word(kMultistepMethods, settings.type) && settings.step)
-    checker.issue(checker.path("step"), "is " + text_of(*settings.step) + "; " + settings.type +
-                                            " chooses its own steps: leave it out and give rtol, atol or max_step");
+    checker.refuse("step", "is {}; {} chooses its own steps: leave it out and give rtol, atol or max_step",
+                   *settings.step, settings.type);
   if (settings.initial_step && settings.max_step && *settings.initial_step > *settings.max_step)
-    checker.issue(checker.path("initial_step"),
-                  "is " + text_of(*settings.initial_step) + ", above max_step " + text_of(*settings.max_step));
-  const auto relative = [&](const std::string& path, const std::optional<double>& rtol) {
-    if (rtol && *rtol >= 1) checker.issue(path, "is " + text_of(*rtol) + ", a relative tolerance must be below 1");
+    checker.refuse("initial_step", "is {}, above max_step {}", *settings.initial_step, *settings.max_step);
+  const std::string path = checker.path("rtol");
+  const auto relative = [&](const std::string& place, const std::optional<double>& rtol) {
+    if (rtol && *rtol >= 1) checker.issue(place, filled("is {}, a relative tolerance must be below 1", *rtol));
   };
-  const std::string rtol = checker.path("rtol");
   if (const auto& kinds = settings.rtol_of) {
-    relative(child_path(rtol, "position"), kinds->position);
-    relative(child_path(rtol, "angle"), kinds->angle);
-    relative(child_path(rtol, "velocity"), kinds->velocity);
-    relative(child_path(rtol, "rate"), kinds->rate);
-    for (const auto& [name, value] : kinds->bodies) relative(child_path(child_path(rtol, "bodies"), name), value);
+    relative(child_path(path, "position"), kinds->position);
+    relative(child_path(path, "angle"), kinds->angle);
+    relative(child_path(path, "velocity"), kinds->velocity);
+    relative(child_path(path, "rate"), kinds->rate);
+    for (const auto& [name, value] : kinds->bodies) relative(child_path(child_path(path, "bodies"), name), value);
   } else {
-    relative(rtol, settings.rtol);
+    relative(path, settings.rtol);
   }
 }
 
 void check_meaning(Checker& checker, const SimulationSettings& settings) {
-  if (settings.end_time <= settings.start_time)
-    checker.issue(checker.path("end_time"), "is " + text_of(settings.end_time) + " s, it must be after start_time, " +
-                                                text_of(settings.start_time) + " s");
-  const double span = settings.end_time - settings.start_time;
+  const double start = settings.start_time, end = settings.end_time, span = end - start;
+  if (end <= start) checker.refuse("end_time", "is {} s, it must be after start_time, {} s", end, start);
   constexpr double kResolved = 1e-8;  // a step of a millionth of the span still has two digits
-  if (span > 0 && span < kResolved * std::max(std::abs(settings.start_time), std::abs(settings.end_time)))
-    checker.issue(checker.path("end_time"), "is " + text_of(span) + " s after start_time, " +
-                                                text_of(settings.start_time) +
-                                                " s: numbers of that size do not resolve steps of so short a time; "
-                                                "let time begin near 0");
+  if (span > 0 && span < kResolved * std::max(std::abs(start), std::abs(end)))
+    checker.refuse("end_time",
+                   "is {} s after start_time, {} s: numbers of that size do not resolve steps of so short a time; let "
+                   "time begin near 0",
+                   span, start);
   const IntegratorSettings& integrator = settings.integrator;
   if (integrator.step && span / *integrator.step > static_cast<double>(integrator.max_steps))
     checker.issue(child_path(checker.path("integrator"), "step"),
-                  "is " + text_of(*integrator.step) + " s: the run would need more steps than max_steps, " +
-                      text_of(static_cast<double>(integrator.max_steps)) +
-                      ", allows; take a longer step, or raise max_steps");
+                  filled("is {} s: the run would need more steps than max_steps, {}, allows; take a longer step, or "
+                         "raise max_steps",
+                         *integrator.step, static_cast<double>(integrator.max_steps)));
   if (settings.output_step && span / *settings.output_step > kMostRows)
-    checker.issue(checker.path("output_step"),
-                  "is " + text_of(*settings.output_step) + " s: more than " + text_of(kMostRows) +
-                      " rows of trajectory.csv; take a longer one, or an earlier end_time");
+    checker.refuse("output_step",
+                   "is {} s: more than {} rows of trajectory.csv; take a longer one, or an earlier end_time",
+                   *settings.output_step, kMostRows);
   if (settings.accuracy && *settings.accuracy >= 1)
-    checker.issue(checker.path("accuracy"), "is " + text_of(*settings.accuracy) + ", a relative error must be below 1");
-  if (!settings.events.empty() && has_word(kMultistepMethods, settings.integrator.type))
-    checker.issue(checker.path("events"),
-                  "are times at which a step ends; " + settings.integrator.type +
-                      " does not end steps there: leave them out, or take a Runge-Kutta method");
-  for (std::size_t i = 0; i < settings.events.size(); ++i) {
-    const double event = settings.events[i];
-    if (!(event > settings.start_time && event < settings.end_time))
+    checker.refuse("accuracy", "is {}, a relative error must be below 1", *settings.accuracy);
+  if (!settings.events.empty() && has_word(kMultistepMethods, integrator.type))
+    checker.refuse("events",
+                   "are times at which a step ends; {} does not end steps there: leave them out, or take a Runge-Kutta "
+                   "method",
+                   integrator.type);
+  for (std::size_t i = 0; i < settings.events.size(); ++i)
+    if (const double event = settings.events[i]; !(event > start && event < end))
       checker.issue(child_path(checker.path("events"), i),
-                    "is " + text_of(event) + " s, it must lie between start_time, " + text_of(settings.start_time) +
-                        " s, and end_time, " + text_of(settings.end_time) + " s");
-  }
+                    filled("is {} s, it must lie between start_time, {} s, and end_time, {} s", event, start, end));
 }
 
 }  // namespace mbsopt

@@ -124,9 +124,9 @@ constinit const std::span<const TypeRow> kDriveTypes = kDrives;
 constinit const std::span<const TypeRow> kForceTypes = kForces;
 constinit const std::span<const TypeRow> kSensorQuantities = kQuantities;
 
-Need need_of(const TypeRow& row, std::string_view field) {
+Need TypeRow::operator[](std::string_view field) const {
   Need need = Need::unknown;
-  any_word(row.fields, [&](std::string_view word) {
+  any_word(fields, [&](std::string_view word) {
     const bool required = word.back() == '!';
     if (required) word.remove_suffix(1);
     if (word != field) return false;
@@ -183,6 +183,9 @@ void emplace_kind(std::variant<Kinds...>& kind, std::string_view type) {
 
 }  // namespace
 
+void set_type(Joint& joint, std::string_view type) { joint.type = type; }
+void set_type(Drive& drive, std::string_view type) { drive.type = type; }
+void set_type(Sensor& sensor, std::string_view type) { sensor.quantity = type; }
 void set_type(Force& force, std::string_view type) {
   if (type != type_of(force)) emplace_kind(force.kind, type);
 }

@@ -12,6 +12,7 @@
 
 namespace mbsopt {
 
+struct Drive;
 struct Force;
 struct Joint;
 struct Sensor;
@@ -28,6 +29,8 @@ enum class Reads {
   motion           // accelerations and reactions: no force may use it
 };
 
+enum class Need { unknown, optional, required };
+
 struct TypeRow {
   std::string_view name;
   std::string_view description;
@@ -36,6 +39,8 @@ struct TypeRow {
   Dimension dimension = {};          // of a sensor's values (dimension_of_quantity has exceptions)
   Reads reads = Reads::positions;    // of a sensor (reads_of_quantity has exceptions)
   std::string_view unit = "";        // of a sensor whose dimension does not determine it
+
+  Need operator[](std::string_view field) const;  // how the type needs a field
 };
 
 extern const std::span<const TypeRow> kJointTypes, kDriveTypes, kForceTypes, kSensorQuantities;
@@ -49,9 +54,6 @@ inline constexpr std::string_view kMultistepMethods = "cvodes_adams cvodes_bdf";
 
 // Names with a meaning in laws and objectives; nothing else may use them.
 inline constexpr std::string_view kReservedNames = "t l ldot angle rate pi ground O";
-
-enum class Need { unknown, optional, required };
-Need need_of(const TypeRow& row, std::string_view field);
 
 const TypeRow* find_row(std::span<const TypeRow> rows, std::string_view name);  // nullptr when there is none
 std::vector<std::string> names_of(std::span<const TypeRow> rows);
@@ -72,7 +74,10 @@ std::optional<Dimension> dimension_of_quantity(const Sensor& sensor);
 Reads reads_of_quantity(const Sensor& sensor);
 
 std::string_view type_of(const Force& force);
+void set_type(Joint& joint, std::string_view type);
+void set_type(Drive& drive, std::string_view type);
 void set_type(Force& force, std::string_view type);
+void set_type(Sensor& sensor, std::string_view type);
 
 bool is_identifier(std::string_view text);
 

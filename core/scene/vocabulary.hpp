@@ -18,8 +18,7 @@
 //   vector(key, VectorField&, says)             three of them
 //   point(key, PointField&, body, says)         a point or vector of that body, by name or by its coordinates
 //   inertia, orientation, points                the forms that the problem format gives them
-//   law(key, optional<Expression>&, Names, says)  an expression over further names, too
-//   expression(key, Expression&, Names, says)   the same, always present
+//   expression(key, Expression&, Names, says)   an expression over further names, too; also optional<Expression>
 //   time_law(key, Expression&, optional<SampledLaw>&, says)  an expression of t, or samples from a file
 //   laws(key, LawVector&, Names, says)          three of them
 //   plain(key, double&, Range, says)            a number without parameters; also long, int, bool, optional
@@ -90,6 +89,11 @@ inline constexpr Range kNotNegative{0, false};
 
 template <class T, class Of>
 concept Like = std::same_as<std::remove_const_t<T>, Of>;
+
+// Makes an object one of that type, unless it is constant or has no type.
+void become(auto& object, const TypeRow& row) {
+  if constexpr (requires { set_type(object, row.name); }) set_type(object, row.name);
+}
 
 inline constexpr Choice<ParameterScale> kParameterScales[] = {
     {"linear", ParameterScale::linear}, {"log", ParameterScale::log}, {"log10", ParameterScale::log10}};
@@ -180,28 +184,26 @@ void describe(auto& v, Like<Body> auto& b) {
 
 void describe(auto& v, Like<Joint> auto& j) {
   using namespace dimension;
-  const TypeRow* const row = v.type("type", j.type, std::span(kJointTypes), {"type of the joint", Need::required});
-  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(j)>>)
-    if (row) j.type = row->name;
+  const TypeRow* const type = v.type("type", j.type, std::span(kJointTypes), {"type of the joint", Need::required});
   v.name("name", j.name, {"name of the joint", Need::required});
-  if (!row) return v.rest_unknown();
-  const bool has_bodies = need_of(*row, "joint1") == Need::unknown;
+  if (!type) return v.rest_unknown();
+  const TypeRow& row = *type;
+  become(j, row);
+  const bool has_bodies = row["joint1"] == Need::unknown;
   v.reference("body1", j.body1, ElementKind::body, {"first body", has_bodies ? Need::optional : Need::unknown});
   v.reference("body2", j.body2, ElementKind::body, {"second body", has_bodies ? Need::required : Need::unknown});
-  v.point("point1", j.point1, j.body1, {"point of body1 [m]", need_of(*row, "point1"), kLength});
-  v.point("point2", j.point2, j.body2, {"point of body2 [m]", need_of(*row, "point2"), kLength});
-  v.point("axis1", j.axis1, j.body1, {"direction in body1", need_of(*row, "axis1")});
-  v.point("axis2", j.axis2, j.body2, {"direction in body2", need_of(*row, "axis2")});
-  v.point("normal1", j.normal1, j.body1,
-          {"direction in body1 from which the angle is measured", need_of(*row, "normal1")});
-  v.point("normal2", j.normal2, j.body2,
-          {"direction in body2 to which the angle is measured", need_of(*row, "normal2")});
-  v.number("length", j.length, {"of the rod [m]", need_of(*row, "length"), kLength});
-  v.reference("joint1", j.joint1, ElementKind::joint, {"joint that turns", need_of(*row, "joint1")});
-  v.reference("joint2", j.joint2, ElementKind::joint, {"joint that follows", need_of(*row, "joint2")});
-  v.number("ratio", j.ratio, {"angle of joint2 per angle of joint1", need_of(*row, "ratio"), Dimension{}});
-  v.number("radius", j.radius, {"displacement of joint2 per radian of joint1 [m]", need_of(*row, "radius"), kLength});
-  v.number("pitch", j.pitch, {"displacement per turn, right-handed [m]", need_of(*row, "pitch"), kLength});
+  v.point("point1", j.point1, j.body1, {"point of body1 [m]", row["point1"], kLength});
+  v.point("point2", j.point2, j.body2, {"point of body2 [m]", row["point2"], kLength});
+  v.point("axis1", j.axis1, j.body1, {"direction in body1", row["axis1"]});
+  v.point("axis2", j.axis2, j.body2, {"direction in body2", row["axis2"]});
+  v.point("normal1", j.normal1, j.body1, {"direction in body1 from which the angle is measured", row["normal1"]});
+  v.point("normal2", j.normal2, j.body2, {"direction in body2 to which the angle is measured", row["normal2"]});
+  v.number("length", j.length, {"of the rod [m]", row["length"], kLength});
+  v.reference("joint1", j.joint1, ElementKind::joint, {"joint that turns", row["joint1"]});
+  v.reference("joint2", j.joint2, ElementKind::joint, {"joint that follows", row["joint2"]});
+  v.number("ratio", j.ratio, {"angle of joint2 per angle of joint1", row["ratio"], Dimension{}});
+  v.number("radius", j.radius, {"displacement of joint2 per radian of joint1 [m]", row["radius"], kLength});
+  v.number("pitch", j.pitch, {"displacement per turn, right-handed [m]", row["pitch"], kLength});
 }
 
 void describe_samples(auto& v, auto& c, std::string_view file) {
@@ -220,7 +222,7 @@ void describe(auto& v, Like<SampledLaw> auto& l) {
   v.text("user", l.function,
          {"name of a function of a plug-in or of the program", l.function.empty() ? Need::optional : Need::required});
   if (l.function.empty()) return describe_samples(v, l, "csv");
-  v.law("argument", l.argument, Scope::time_law, {"of the function: of t and parameters; t when absent"});
+  v.expression("argument", l.argument, Scope::time_law, {"of the function: of t and parameters; t when absent"});
 }
 
 void describe(auto& v, Like<Signal> auto& s) {
@@ -234,19 +236,19 @@ void describe(auto& v, Like<Signal> auto& s) {
 
 void describe(auto& v, Like<Drive> auto& d) {
   using namespace dimension;
-  const TypeRow* const row = v.type("type", d.type, std::span(kDriveTypes), {"type of the drive", Need::required});
-  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(d)>>)
-    if (row) d.type = row->name;
+  const TypeRow* const type = v.type("type", d.type, std::span(kDriveTypes), {"type of the drive", Need::required});
   v.name("name", d.name, {"name of the drive", Need::required});
-  if (!row) return v.rest_unknown();
-  v.reference("body", d.body, ElementKind::body, {"body whose coordinate is driven", need_of(*row, "body")});
+  if (!type) return v.rest_unknown();
+  const TypeRow& row = *type;
+  become(d, row);
+  v.reference("body", d.body, ElementKind::body, {"body whose coordinate is driven", row["body"]});
   v.word("coordinate", d.coordinate, Words{"x y z e0 e1 e2 e3"},
-         {"of the centre of mass [m], or an Euler parameter", need_of(*row, "coordinate")});
-  v.reference("joint", d.joint, ElementKind::joint, {"joint that is driven", need_of(*row, "joint")});
-  v.reference("body1", d.body1, ElementKind::body, {"body of the first point", need_of(*row, "body1")});
-  v.reference("body2", d.body2, ElementKind::body, {"body of the second point", need_of(*row, "body2")});
-  v.point("point1", d.point1, d.body1, {"first point [m]", need_of(*row, "point1"), kLength});
-  v.point("point2", d.point2, d.body2, {"second point [m]", need_of(*row, "point2"), kLength});
+         {"of the centre of mass [m], or an Euler parameter", row["coordinate"]});
+  v.reference("joint", d.joint, ElementKind::joint, {"joint that is driven", row["joint"]});
+  v.reference("body1", d.body1, ElementKind::body, {"body of the first point", row["body1"]});
+  v.reference("body2", d.body2, ElementKind::body, {"body of the second point", row["body2"]});
+  v.point("point1", d.point1, d.body1, {"first point [m]", row["point1"], kLength});
+  v.point("point2", d.point2, d.body2, {"second point [m]", row["point2"], kLength});
   v.time_law("law", d.law, d.samples,
              {"expression of t and parameters, or {\"csv\": file, \"time\": column, \"column\": column}, or {\"user\": "
               "function, \"argument\": expression}",
@@ -255,98 +257,97 @@ void describe(auto& v, Like<Drive> auto& d) {
 
 void describe(auto& v, Like<Tsda> auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.reference("body1", f.body1, ElementKind::body, {"first body", need_of(row, "body1")});
-  v.reference("body2", f.body2, ElementKind::body, {"second body", need_of(row, "body2")});
-  v.point("point1", f.point1, f.body1, {"point of body1 [m]", need_of(row, "point1"), kLength});
-  v.point("point2", f.point2, f.body2, {"point of body2 [m]", need_of(row, "point2"), kLength});
-  v.number("stiffness", f.stiffness, {"k [N/m]", need_of(row, "stiffness"), kStiffness});
-  v.number("damping", f.damping, {"c [N s/m]", need_of(row, "damping"), kDamping});
-  v.number("free_length", f.free_length, {"l0 [m]", need_of(row, "free_length"), kLength});
-  v.number("actuator", f.actuator, {"constant tension [N]", need_of(row, "actuator"), kForce});
-  v.law("law", f.law, Scope::tsda_law,
-        {"tension [N] as an expression of l, ldot and t, instead of the coefficients", need_of(row, "law"), kForce});
+  v.reference("body1", f.body1, ElementKind::body, {"first body", row["body1"]});
+  v.reference("body2", f.body2, ElementKind::body, {"second body", row["body2"]});
+  v.point("point1", f.point1, f.body1, {"point of body1 [m]", row["point1"], kLength});
+  v.point("point2", f.point2, f.body2, {"point of body2 [m]", row["point2"], kLength});
+  v.number("stiffness", f.stiffness, {"k [N/m]", row["stiffness"], kStiffness});
+  v.number("damping", f.damping, {"c [N s/m]", row["damping"], kDamping});
+  v.number("free_length", f.free_length, {"l0 [m]", row["free_length"], kLength});
+  v.number("actuator", f.actuator, {"constant tension [N]", row["actuator"], kForce});
+  v.expression("law", f.law, Scope::tsda_law,
+               {"tension [N] as an expression of l, ldot and t, instead of the coefficients", row["law"], kForce});
 }
 
 void describe_torsion(auto& v, auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.number("stiffness", f.stiffness, {"k [N m/rad]", need_of(row, "stiffness"), kTorque});
-  v.number("damping", f.damping, {"c [N m s/rad]", need_of(row, "damping"), kTorsionalDamping});
-  v.number("free_angle", f.free_angle, {"angle without torque [rad]", need_of(row, "free_angle"), kAngle});
-  v.law("law", f.law, Scope::rsda_law,
-        {"resisting torque [N m] as an expression of angle, rate and t, instead of the coefficients",
-         need_of(row, "law"), kTorque});
+  v.number("stiffness", f.stiffness, {"k [N m/rad]", row["stiffness"], kTorque});
+  v.number("damping", f.damping, {"c [N m s/rad]", row["damping"], kTorsionalDamping});
+  v.number("free_angle", f.free_angle, {"angle without torque [rad]", row["free_angle"], kAngle});
+  v.expression("law", f.law, Scope::rsda_law,
+               {"resisting torque [N m] as an expression of angle, rate and t, instead of the coefficients", row["law"],
+                kTorque});
 }
 
 void describe(auto& v, Like<Rsda> auto& f, const TypeRow& row) {
-  v.reference("joint", f.joint, ElementKind::joint, {"joint on whose angle it acts", need_of(row, "joint")});
+  v.reference("joint", f.joint, ElementKind::joint, {"joint on whose angle it acts", row["joint"]});
   describe_torsion(v, f, row);
 }
 
 void describe(auto& v, Like<TorsionBar> auto& f, const TypeRow& row) {
-  v.reference("body1", f.body1, ElementKind::body, {"first body, in which the axis is fixed", need_of(row, "body1")});
-  v.reference("body2", f.body2, ElementKind::body, {"second body", need_of(row, "body2")});
-  v.point("axis", f.axis, f.body1, {"axis about which it acts, in the axes of body1", need_of(row, "axis")});
+  v.reference("body1", f.body1, ElementKind::body, {"first body, in which the axis is fixed", row["body1"]});
+  v.reference("body2", f.body2, ElementKind::body, {"second body", row["body2"]});
+  v.point("axis", f.axis, f.body1, {"axis about which it acts, in the axes of body1", row["axis"]});
   describe_torsion(v, f, row);
 }
 
 void describe(auto& v, Like<PointForce> auto& f, const TypeRow& row) {
-  v.reference("body", f.body, ElementKind::body, {"body it acts on", need_of(row, "body")});
-  v.point("point", f.point, f.body, {"point of the body [m]", need_of(row, "point"), dimension::kLength});
+  v.reference("body", f.body, ElementKind::body, {"body it acts on", row["body"]});
+  v.point("point", f.point, f.body, {"point of the body [m]", row["point"], dimension::kLength});
   v.laws("components", f.components, Scope::state,
-         {"x, y, z [N], expressions of t, parameters and sensors", need_of(row, "components"), dimension::kForce});
-  v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", need_of(row, "frame")});
+         {"x, y, z [N], expressions of t, parameters and sensors", row["components"], dimension::kForce});
+  v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", row["frame"]});
 }
 
 void describe(auto& v, Like<Torque> auto& f, const TypeRow& row) {
-  v.reference("body", f.body, ElementKind::body, {"body it acts on", need_of(row, "body")});
+  v.reference("body", f.body, ElementKind::body, {"body it acts on", row["body"]});
   v.laws("components", f.components, Scope::state,
-         {"x, y, z [N m], expressions of t, parameters and sensors", need_of(row, "components"), dimension::kTorque});
-  v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", need_of(row, "frame")});
+         {"x, y, z [N m], expressions of t, parameters and sensors", row["components"], dimension::kTorque});
+  v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", row["frame"]});
 }
 
 void describe(auto& v, Like<BushingSpec> auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.reference("body1", f.body1, ElementKind::body,
-              {"first body, whose axes the coefficients refer to", need_of(row, "body1")});
-  v.reference("body2", f.body2, ElementKind::body, {"second body", need_of(row, "body2")});
-  v.point("point1", f.point1, f.body1, {"point of body1 [m]", need_of(row, "point1"), kLength});
-  v.point("point2", f.point2, f.body2, {"point of body2 [m]", need_of(row, "point2"), kLength});
-  v.vector("stiffness", f.stiffness, {"along x, y, z of body1 [N/m]", need_of(row, "stiffness"), kStiffness});
-  v.vector("damping", f.damping, {"along x, y, z of body1 [N s/m]", need_of(row, "damping"), kDamping});
+  v.reference("body1", f.body1, ElementKind::body, {"first body, whose axes the coefficients refer to", row["body1"]});
+  v.reference("body2", f.body2, ElementKind::body, {"second body", row["body2"]});
+  v.point("point1", f.point1, f.body1, {"point of body1 [m]", row["point1"], kLength});
+  v.point("point2", f.point2, f.body2, {"point of body2 [m]", row["point2"], kLength});
+  v.vector("stiffness", f.stiffness, {"along x, y, z of body1 [N/m]", row["stiffness"], kStiffness});
+  v.vector("damping", f.damping, {"along x, y, z of body1 [N s/m]", row["damping"], kDamping});
   v.vector("torsional_stiffness", f.torsional_stiffness,
-           {"about x, y, z of body1 [N m/rad]", need_of(row, "torsional_stiffness"), kTorque});
+           {"about x, y, z of body1 [N m/rad]", row["torsional_stiffness"], kTorque});
   v.vector("torsional_damping", f.torsional_damping,
-           {"about x, y, z of body1 [N m s/rad]", need_of(row, "torsional_damping"), kTorsionalDamping});
+           {"about x, y, z of body1 [N m s/rad]", row["torsional_damping"], kTorsionalDamping});
 }
 
 void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
-  v.reference("joint", f.joint, ElementKind::joint, {"joint it acts in", need_of(row, "joint")});
+  v.reference("joint", f.joint, ElementKind::joint, {"joint it acts in", row["joint"]});
   v.word("motion", f.motion, Words{"rotation translation"},
-         {"about or along the axis; when absent, about it where the joint has an angle", need_of(row, "motion")});
-  v.number("coulomb", f.coulomb, {"torque [N m] or force [N] at high rates", need_of(row, "coulomb")});
+         {"about or along the axis; when absent, about it where the joint has an angle", row["motion"]});
+  v.number("coulomb", f.coulomb, {"torque [N m] or force [N] at high rates", row["coulomb"]});
   v.number("smooth_velocity", f.smooth_velocity,
-           {"rate at which the Coulomb part is 0.71 of its level [rad/s], [m/s]", need_of(row, "smooth_velocity")});
-  v.number("viscous", f.viscous, {"torque [N m s/rad] or force [N s/m] per rate", need_of(row, "viscous")});
-  v.number("breakaway", f.breakaway,
-           {"torque [N m] or force [N] of dry friction at low rates; when absent, that at high rates",
-            need_of(row, "breakaway")});
+           {"rate at which the Coulomb part is 0.71 of its level [rad/s], [m/s]", row["smooth_velocity"]});
+  v.number("viscous", f.viscous, {"torque [N m s/rad] or force [N s/m] per rate", row["viscous"]});
+  v.number(
+      "breakaway", f.breakaway,
+      {"torque [N m] or force [N] of dry friction at low rates; when absent, that at high rates", row["breakaway"]});
   v.number("stribeck_velocity", f.stribeck_velocity,
-           {"rate at which 1/e of breakaway - coulomb is left [rad/s], [m/s]", need_of(row, "stribeck_velocity")});
+           {"rate at which 1/e of breakaway - coulomb is left [rad/s], [m/s]", row["stribeck_velocity"]});
 }
 
 void describe(auto& v, Like<UserForceSpec> auto& f, const TypeRow& row) {
-  v.text("force", f.force, {"name of a force of a plug-in or of the program", need_of(row, "force")});
+  v.text("force", f.force, {"name of a force of a plug-in or of the program", row["force"]});
   v.references("bodies", f.bodies, ElementKind::body,
-               {"bodies of the force, in its order; when absent those that the force names", need_of(row, "bodies")});
+               {"bodies of the force, in its order; when absent those that the force names", row["bodies"]});
   v.named("parameters", f.parameters,
-          {"parameters of the force, each an expression of parameters of the problem", need_of(row, "parameters")});
+          {"parameters of the force, each an expression of parameters of the problem", row["parameters"]});
 }
 
 void describe(auto& v, Like<Force> auto& f) {
   const TypeRow* const row = v.type("type", type_of(f), std::span(kForceTypes), {"type of the force", Need::required});
   v.name("name", f.name, {"name of the force", Need::required});
   if (!row) return v.rest_unknown();
-  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(f)>>) set_type(f, row->name);
+  become(f, *row);
   std::visit([&](auto& kind) { describe(v, kind, *row); }, f.kind);
 }
 
@@ -357,31 +358,30 @@ void describe(auto& v, Like<PointOnBody> auto& p) {
 
 void describe(auto& v, Like<Sensor> auto& s) {
   using dimension::kLength;
-  const TypeRow* const row =
+  const TypeRow* const type =
       v.type("quantity", s.quantity, std::span(kSensorQuantities), {"what is measured", Need::required});
-  if (!row) return v.rest_unknown();
-  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(s)>>) s.quantity = row->name;
-  v.reference("body", s.body, ElementKind::body, {"body it is on", need_of(*row, "body")});
-  v.point("point", s.point, s.body, {"point of the body [m]", need_of(*row, "point"), kLength});
-  if (need_of(*row, "relative_to") != Need::unknown)
+  if (!type) return v.rest_unknown();
+  const TypeRow& row = *type;
+  become(s, row);
+  v.reference("body", s.body, ElementKind::body, {"body it is on", row["body"]});
+  v.point("point", s.point, s.body, {"point of the body [m]", row["point"], kLength});
+  if (row["relative_to"] != Need::unknown)
     v.object("relative_to", s.relative_to, {"point whose position or velocity is subtracted"});
-  v.word("component", s.component, Words{row->components}, {"which component", need_of(*row, "component")});
-  v.choice("frame", s.in_body_frame, kFrames, {"axes of the component", need_of(*row, "frame")});
-  v.reference("joint", s.joint, ElementKind::joint, {"joint that has it", need_of(*row, "joint")});
-  v.reference("body1", s.body1, ElementKind::body, {"body of the first point", need_of(*row, "body1")});
-  v.reference("body2", s.body2, ElementKind::body, {"body of the second point", need_of(*row, "body2")});
-  v.point("point1", s.point1, s.body1, {"first point [m]", need_of(*row, "point1"), kLength});
-  v.point("point2", s.point2, s.body2, {"second point [m]", need_of(*row, "point2"), kLength});
-  v.reference("force", s.force, ElementKind::force, {"a tsda, rsda or torsion_bar", need_of(*row, "force")});
-  v.word("kind", s.kind, Words{"force torque"}, {"which reaction", need_of(*row, "kind")});
-  v.reference("drive", s.drive, ElementKind::drive, {"a drive", need_of(*row, "drive")});
-  v.point("axis", s.axis, s.body1.empty() ? "ground" : s.body1,
-          {"direction in the ground, or in body1", need_of(*row, "axis")});
+  v.word("component", s.component, Words{row.components}, {"which component", row["component"]});
+  v.choice("frame", s.in_body_frame, kFrames, {"axes of the component", row["frame"]});
+  v.reference("joint", s.joint, ElementKind::joint, {"joint that has it", row["joint"]});
+  v.reference("body1", s.body1, ElementKind::body, {"body of the first point", row["body1"]});
+  v.reference("body2", s.body2, ElementKind::body, {"body of the second point", row["body2"]});
+  v.point("point1", s.point1, s.body1, {"first point [m]", row["point1"], kLength});
+  v.point("point2", s.point2, s.body2, {"second point [m]", row["point2"], kLength});
+  v.reference("force", s.force, ElementKind::force, {"a tsda, rsda or torsion_bar", row["force"]});
+  v.word("kind", s.kind, Words{"force torque"}, {"which reaction", row["kind"]});
+  v.reference("drive", s.drive, ElementKind::drive, {"a drive", row["drive"]});
+  v.point("axis", s.axis, s.body1.empty() ? "ground" : s.body1, {"direction in the ground, or in body1", row["axis"]});
   v.expression("value", s.value, Scope::sensor,
-               {"expression of t, parameters, definitions and other sensors", need_of(*row, "value")});
-  v.orientation(
-      "axes", s.axes,
-      {"orientation of the sensor's axes in the body's axes, written like that of a body", need_of(*row, "axes")});
+               {"expression of t, parameters, definitions and other sensors", row["value"]});
+  v.orientation("axes", s.axes,
+                {"orientation of the sensor's axes in the body's axes, written like that of a body", row["axes"]});
 }
 
 void describe(auto& v, Like<Condition> auto& c) {

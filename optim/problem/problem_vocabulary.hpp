@@ -75,15 +75,15 @@ void describe(auto& v, Like<UserCostSpec> auto& c) {
 
 void describe_means(auto& v, auto& means) {
   for (std::size_t k = 0; k < std::size(kMeanKinds); ++k)
-    v.law(kMeanKinds[k].name, means[k], Scope::objective, {kMeanKinds[k].description});
+    v.expression(kMeanKinds[k].name, means[k], Scope::objective, {kMeanKinds[k].description});
 }
 
 void describe(auto& v, Like<ObjectiveSpec> auto& o) {
-  v.law("running", o.running, Scope::objective, {"integrated over time; of sensors, t and parameters"});
-  v.law("terminal", o.terminal, Scope::objective, {"added, at the end time; of sensors, t and parameters"});
+  v.expression("running", o.running, Scope::objective, {"integrated over time; of sensors, t and parameters"});
+  v.expression("terminal", o.terminal, Scope::objective, {"added, at the end time; of sensors, t and parameters"});
   v.list("samples", o.samples, {"added, each at its time"});
   v.list("track", o.track, {"added: weighted squares of sensor minus data at the rows of a CSV file"});
-  v.law("parameters_only", o.parameters_only, Scope::none, {"added; of parameters only"});
+  v.expression("parameters_only", o.parameters_only, Scope::none, {"added; of parameters only"});
   describe_means(v, o.means);
   v.object("eigenvalue", o.eigenvalue, {"alone: frequency or damping ratio of a mode near the initial equilibrium"});
   v.object("frequency_response", o.frequency_response,
@@ -99,7 +99,7 @@ void describe(auto& v, Like<ObjectiveBound> auto& b) {
       "objective", b.objective, ElementKind::objective,
       {"objective to bound; or, in its place, one of maximum_of, minimum_of, peak_to_peak_of, rms_of and sampled"});
   describe_means(v, b.means);
-  v.law("sampled", b.sampled, Scope::objective, {"its value at each of the instants start_time + k every"});
+  v.expression("sampled", b.sampled, Scope::objective, {"its value at each of the instants start_time + k every"});
   v.plain("every", b.every, kPositive, {"of sampled [s]"});
   v.plain("sharpness", b.sharpness, kPositive,
           {"of an extreme in place of an objective; when absent 100 over the larger absolute value of the bounds"});

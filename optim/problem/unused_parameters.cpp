@@ -93,7 +93,7 @@ class MentionSearch {
   static bool measures_everything(const Sensor& sensor) {
     const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
     constexpr const char* kParts[] = {"body", "body2", "joint", "force", "drive", "value"};
-    return row && std::ranges::all_of(kParts, [&](const char* part) { return need_of(*row, part) == Need::unknown; });
+    return row && std::ranges::all_of(kParts, [&](const char* part) { return (*row)[part] == Need::unknown; });
   }
 
   void describe_to(Mentions& found, const auto& element) const {

@@ -9,9 +9,9 @@ using namespace mbsopt;
 TEST_CASE("rows say what a type needs, may have and does not know", "[scene]") {
   const TypeRow* const revolute = find_row(kJointTypes, "revolute");
   REQUIRE(revolute);
-  CHECK(need_of(*revolute, "axis1") == Need::required);
-  CHECK(need_of(*revolute, "normal1") == Need::optional);
-  CHECK(need_of(*revolute, "axis") == Need::unknown);
+  CHECK((*revolute)["axis1"] == Need::required);
+  CHECK((*revolute)["normal1"] == Need::optional);
+  CHECK((*revolute)["axis"] == Need::unknown);
   CHECK(find_row(kJointTypes, "gearbox") == nullptr);
 }
 

@@ -45,7 +45,7 @@ Scene bodies_at_a_joint() {
 // The joint under test between the two bodies, each of its vectors varied.
 Joint varied_joint(Scene& s, const std::string& type, bool normals) {
   const TypeRow& row = *find_row(kJointTypes, type);
-  auto has = [&](const char* field) { return need_of(row, field) != Need::unknown; };
+  auto has = [&](const char* field) { return row[field] != Need::unknown; };
   const bool across = type == "universal" || type == "perpendicular";  // axis2 at right angles to axis1
   Joint j;
   j.name = "J", j.type = type, j.body1 = "first", j.body2 = "second";
@@ -176,9 +176,9 @@ TEST_CASE("the gradient goes through every number of every joint", "[gradient]")
   for (const TypeRow& row : kJointTypes) {
     const std::string type(row.name);
     for (const bool normals : {false, true}) {
-      if (normals && type != "gear" && type != "rack_pinion" && need_of(row, "normal1") == Need::unknown) continue;
+      if (normals && type != "gear" && type != "rack_pinion" && row["normal1"] == Need::unknown) continue;
       INFO(type << (normals ? " with normals" : ""));
-      const bool ties = need_of(row, "joint1") != Need::unknown;
+      const bool ties = row["joint1"] != Need::unknown;
       check_gradient(ties ? with_tie(type, normals) : with_joint(type, normals));
     }
   }
