@@ -7,7 +7,7 @@
 //
 //   sums         "m1, m2: only m1 + m2 is determined"                    of parameters of one unit
 //   products     "m, g, J: only m*g/J is determined"                     whole or half exponents
-//   of products  "m, a, I: only m*a and I + m*a^2 are determined"        if units are known: sums_of_products.hpp
+//   of products  "m, a, I: only m*a and I + m*a^2 are determined"        if units are known
 //   otherwise    "a, b: only a + 0.25*b is determined"                   near this solution
 // A group without any: "c: does not influence what is measured".
 #pragma once
