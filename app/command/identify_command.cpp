@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
-#include <tuple>
 #include <utility>
 
 #include "app/report/identification_page.hpp"
@@ -12,7 +10,6 @@
 #include "app/results/channel_data.hpp"
 #include "app/results/identification_results.hpp"
 #include "app/results/joint_forces.hpp"
-#include "app/results/objective_units.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
@@ -25,11 +22,9 @@
 #include "core/simulate/simulation_warnings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
-#include "optim/fit/experiment.hpp"
-#include "optim/fit/experiment_stack.hpp"
-#include "optim/fit/fit_start.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
+#include "optim/fit/unknown_parameters.hpp"
 #include "optim/fit/windows.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
@@ -58,35 +53,12 @@ IdentificationOptions simulating(Run& run) {
   return options;
 }
 
-// Residuals at points of the fit, which statistics ask for again.
-class KnownResiduals : public ResidualRecords {
- public:
-  bool recall(const Asked& asked, Experiment::Residuals& found) override {
-    const auto known = known_.find(key_of(asked));
-    if (known != known_.end()) found = known->second;
-    return known != known_.end();
-  }
-  void record(const Asked& asked, const Experiment::Residuals& found) override {
-    constexpr Eigen::Index kMostNumbers = 50'000;  // more would fill the memory
-    if (found.z.size() + found.z_u.size() <= kMostNumbers) known_[key_of(asked)] = found;
-  }
-
- private:
-  using Key = std::tuple<std::size_t, std::vector<double>, std::vector<double>>;
-  static Key key_of(const Asked& asked) { return {asked.experiment, entries_of(asked.u), asked.sigma}; }
-
-  std::map<Key, Experiment::Residuals> known_;
-};
-
 // given is the problem of the file, cut into windows.
 IdentificationResult fitted(LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data,
                             const Problem& given) {
   Run& run = long_run.run;
-  IdentificationOptions options;
-  KnownResiduals known;
-  options.records = &known;
-  options.threads = case_threads(run);
-  options.simulation_progress = fit_progress(run);
+  IdentificationOptions options = simulating(run);
+  options.remembers = true;
   options.progress = [&](const FitRow& row) {
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.6e}   gradient {:.1e}   step {:.1e}   {}",
                                        row.iteration, row.cost, row.gradient_norm, row.step_norm,
@@ -250,7 +222,7 @@ int identify_command(const CommandContext& context) {
   const Mechanism mechanism(first, parameter_values(first));
   run.start();
   if (!settle_accuracy(run, first, {})) return run.finish();
-  const CutProblem cut = cut_into_windows(run.problem, whole, {}, fit_progress(run));  // by the settled integrator
+  const CutProblem cut = cut_into_windows(run.problem, whole, fit_progress(run));  // by the settled integrator
   run.progress.finish();
   const std::vector<CsvTable>& data = cut.data;
   if (const Assembly assembly(mechanism, first.simulation.start_time); assembly.result().ok) {

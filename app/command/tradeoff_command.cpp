@@ -31,7 +31,7 @@ void sweep(Run& run) {
   if (!tradeoff.rows.empty()) run.write("tradeoff.csv", to_csv(tradeoff));
   show_given_settings(run, tradeoff);
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
-  const CutProblem cut = cut_into_windows(problem, data, {}, [](double) { return !interrupted(); });
+  const CutProblem cut = cut_into_windows(problem, data, [](double) { return !interrupted(); });
   run.warn(cut.warnings);
   tradeoff.interrupted = tradeoff.interrupted || interrupted();
   // The sum of squares of `identify` is not an objective of the file; the integrator limits its accuracy.

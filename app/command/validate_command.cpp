@@ -58,7 +58,7 @@ int validate_command(const CommandContext& context) {
   if (run.problem.identification) {
     Problem problem = run.problem;
     problem.scene.simulation.accuracy.reset();  // the default integrator guesses the starts
-    const CutProblem cut = cut_into_windows(problem, data_of(problem), {}, [](double) { return !interrupted(); });
+    const CutProblem cut = cut_into_windows(problem, data_of(problem), [](double) { return !interrupted(); });
     run.warn(cut.warnings);
     add_windows(run, cut.problem);
     const std::vector<ChannelData> channels = channel_data(cut.problem, cut.data);

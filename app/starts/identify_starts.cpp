@@ -1,6 +1,5 @@
 #include "app/starts/identify_starts.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "app/results/objective_units.hpp"
@@ -96,15 +95,8 @@ BestStart from_best_start(LongRun& long_run, const std::vector<CsvTable>& data) 
 }
 
 void describe_given(const Problem& given, IdentificationResult& fit) {
-  for (FittedParameter& fitted : fit.parameters) {
-    for (const Parameter& p : given.scene.parameters)
-      if (p.name == fitted.parameter) fitted.initial = p.value;
-    for (const ExperimentSpec& experiment : given.identification->experiments) {
-      if (experiment.name != fitted.experiment) continue;
-      for (const auto& [name, value] : experiment.overrides)
-        if (name == fitted.parameter) fitted.initial = value;
-    }
-  }
+  const std::vector<UnknownParameter> unknowns = unknowns_of_fit(given.scene, *given.identification);  // in this order
+  for (std::size_t k = 0; k < fit.parameters.size(); ++k) fit.parameters[k].initial = unknowns[k].description.value;
 }
 
 }  // namespace mbsopt::inline app

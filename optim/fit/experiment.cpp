@@ -8,7 +8,9 @@
 #include <span>
 #include <stdexcept>
 
+#include "core/body/state_layout.hpp"
 #include "core/expression/did_you_mean.hpp"
+#include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/scene_programs.hpp"
 #include "core/scene/field_visitor.hpp"
@@ -36,15 +38,34 @@ bool depends_on_time(const Scene& scene) {
   FieldVisitor visitor(
       [&](const FieldPlace&, const Expression& e, Scope) {
         const std::vector<std::string> names = e.names();
-        found = found || std::find(names.begin(), names.end(), "t") != names.end();
+        found = found || std::ranges::find(names, "t") != names.end();
       },
       [](const std::string&, const std::string&) {});
-  for (const Force& force : scene.forces) describe(visitor, force);
+  for (const Force& force : scene.forces) {
+    found = found || std::holds_alternative<UserForceSpec>(force.kind);  // C++ may use t
+    describe(visitor, force);
+  }
   for (const Sensor& sensor : scene.sensors) describe(visitor, sensor);
   return found;
 }
 
 }  // namespace
+
+StateChart::StateChart(const Eigen::VectorXd& y, const Eigen::MatrixXd& y_u)
+    : y0_(y), W_(OrthogonalDecomposition(y_u).solve(Eigen::MatrixXd::Identity(y.size(), y.size()))) {}
+
+void StateChart::read(const Eigen::VectorXd& y, const Eigen::MatrixXd& y_rho, Eigen::VectorXd& s,
+                      Eigen::MatrixXd& s_rho) const {
+  const StateLayout layout = StateLayout::of(y);
+  Eigen::VectorXd sign = Eigen::VectorXd::Ones(y.size());
+  for (int i = 1; i <= layout.n; ++i) {
+    const Eigen::Index p = layout.p(i), pdot = layout.pdot(i);
+    if (y.segment<4>(p).dot(y0_.segment<4>(p)) < 0)
+      sign.segment<4>(p).setConstant(-1), sign.segment<4>(pdot).setConstant(-1);
+  }
+  s = W_ * (sign.cwiseProduct(y) - y0_);
+  s_rho = W_ * (sign.asDiagonal() * y_rho);
+}
 
 Experiment::Differentiated Experiment::evaluated(const Program& program, const Eigen::VectorXd& rho, double t,
                                                  Program::Scratch& scratch) {
@@ -58,14 +79,12 @@ Experiment::Differentiated Experiment::evaluated(const Program& program, const E
 }
 
 Experiment::Experiment(const Scene& scene, const ExperimentSpec& spec, std::string place, const CsvTable& data,
-                       const Eigen::VectorXd& rho, std::vector<Unknown> unknowns,
-                       std::vector<std::shared_ptr<const UserForce>> user_forces)
+                       const Eigen::VectorXd& rho, std::vector<Unknown> unknowns)
     : scene_(scene),
       settings_(scene.simulation),
       rho_(rho),
       unknowns_(std::move(unknowns)),
-      active_(scene.parameters.size(), false),
-      user_forces_(std::move(user_forces)) {
+      active_(scene.parameters.size(), false) {
   for (const auto& [name, value] : spec.overrides) {
     if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{}.overrides.{}: is not finite", place, name));
     rho_(parameter_indices(scene, {name}).front()) = value;
@@ -77,7 +96,7 @@ Experiment::Experiment(const Scene& scene, const ExperimentSpec& spec, std::stri
   take_samples(spec, place, data);
   refuse_short_laws(spec, place);
   scene_.simulation = settings_;
-  if (!unknowns_.empty()) require_unobstructed(simulated(), rho_, active_, user_forces_);
+  if (!unknowns_.empty()) require_unobstructed(simulated(), rho_, active_);
 }
 
 void Experiment::replace_laws(const ExperimentSpec& spec, const std::string& place) {
@@ -88,8 +107,7 @@ void Experiment::replace_laws(const ExperimentSpec& spec, const std::string& pla
     static_cast<SampleColumn&>(*signal) = samples;
   }
   for (std::size_t i = 0; i < spec.drives.size(); ++i) {
-    const auto drive = std::find_if(scene_.drives.begin(), scene_.drives.end(),
-                                    [&](const Drive& d) { return d.name == spec.drives[i].drive; });
+    const auto drive = std::ranges::find(scene_.drives, spec.drives[i].drive, &Drive::name);
     if (drive == scene_.drives.end())
       throw std::invalid_argument(
           fmt::format("{}.drives[{}].drive: there is no drive '{}'", place, i, spec.drives[i].drive));
@@ -127,8 +145,7 @@ double Experiment::largest_delay(const Program& delay, const std::vector<double>
 
 // d s/dt along the dense output is s_y ydot only where s has no time of its own.
 void Experiment::refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const {
-  const bool of_state = SceneFacts(scene_).reads_of(sensor) < Reads::time_and_state;
-  if (of_state || (!depends_on_time(scene_) && user_forces_.empty())) return;
+  if (SceneFacts(scene_).reads_of(sensor) < Reads::time_and_state || !depends_on_time(scene_)) return;
   for (const Unknown& unknown : unknowns_)
     if (delay.uses(unknown.parameter))
       throw std::invalid_argument(fmt::format(
@@ -145,7 +162,7 @@ void Experiment::compile_channels(const ExperimentSpec& spec, const std::string&
   for (std::size_t c = 0; c < spec.channels.size(); ++c) {
     const ChannelSpec& channel = spec.channels[c];
     const std::string at = fmt::format("{}.channels[{}]", place, c);
-    const auto sensor = std::find(sensors.begin(), sensors.end(), channel.sensor);
+    const auto sensor = std::ranges::find(sensors, channel.sensor);
     if (sensor == sensors.end())
       throw std::invalid_argument(fmt::format("{}.sensor: there is no sensor '{}'{}; known: {}", at, channel.sensor,
                                               did_you_mean(channel.sensor, sensors), joined(sensors)));
@@ -173,7 +190,7 @@ void Experiment::compile_channels(const ExperimentSpec& spec, const std::string&
 
 StateChart Experiment::chart_of_start(const std::vector<Unknown>& own) const {
   const Scene scene = simulated();
-  const Assembly assembly(Mechanism(scene, rho_, active_, user_forces_), settings_.start_time);
+  const Assembly assembly(Mechanism(scene, rho_, active_), settings_.start_time);
   if (!assembly.result().ok)
     throw std::invalid_argument(fmt::format("the mechanism cannot be assembled at {:g} s: {}", settings_.start_time,
                                             assembly.result().message));
@@ -212,12 +229,11 @@ void Experiment::take_samples(const ExperimentSpec& spec, const std::string& pla
       }
       if (!any) times_.push_back(t[row]);
       any = true;
-      samples_.push_back({times_.size() - 1, c, measured});
+      samples_.push_back({times_.size() - 1, c, measured, row});
     }
   }
   for (std::size_t c = 0; c < channels_.size(); ++c) {
-    const bool used = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) { return s.channel == c; });
-    if (!used && channels_[c].first > start)
+    if (std::ranges::find(samples_, c, &Sample::channel) == samples_.end() && channels_[c].first > start)
       throw std::invalid_argument(fmt::format(
           "{}.channels[{}].delay: is up to {:.6g} s within the bounds of its parameters; no sample of '{}' comes that "
           "long after the start at {} s, before which the model does not reach back",
@@ -334,47 +350,27 @@ class Experiment::Reading {
 
   void run() {
     const std::vector<bool> none(of_.active_.size(), false);
-    const Mechanism mechanism(of_.scene_, rho_, limits_.derivatives ? of_.active_ : none, of_.user_forces_,
-                              of_.programs_);
+    const Mechanism mechanism(of_.scene_, rho_, limits_.derivatives ? of_.active_ : none, {}, of_.programs_);
     y_bar_.resize(mechanism.states());
     rho_bar_.resize(rho_.size());
-    TangentSampling sampling;
-    Sampling values;
-    (limits_.derivatives ? sampling.times : values.times) = times_;
-    sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
+    const auto read = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
       if (k == readings_ && of_.start_chart_) return take_end(*of_.start_chart_, at, y_rho, r_.start, r_.start_u);
       if (k >= readings_) return take_end(*of_.end_chart_, at, y_rho, r_.end, r_.end_u);
-      for_samples_at(k, [&](std::size_t i) { take(mechanism, i, at, y_rho); });
-    };
-    values.observe = [&](std::size_t k, const StatePoint& at) {
-      for_samples_at(k, [&](std::size_t i) {
-        const Sample& sample = of_.samples_[i];
-        set_residual(i, of_sample(sample), mechanism.sensor_value(of_.channels_[sample.channel].sensor, at));
-      });
+      if (of_.delayed_) return take(mechanism, k, at, y_rho);
+      for (std::size_t i = of_.first_[k]; i < of_.first_[k + 1]; ++i) take(mechanism, i, at, y_rho);
     };
     RunOptions options;
     options.progress = limits_.progress;
     options.exact_stages = true;
-    const SimulationResult result = limits_.derivatives ? simulate_tlm(mechanism, settings_, {}, sampling, options)
-                                                        : simulate(mechanism, settings_, {}, values, options);
+    const SimulationResult result =
+        limits_.derivatives
+            ? simulate_tlm(mechanism, settings_, {}, {times_, read}, options)
+            : simulate(mechanism, settings_, {},
+                       {times_, [&](std::size_t k, const StatePoint& at) { read(k, at, {}); }}, options);
     r_.steps = result.statistics.steps;
     r_.jumps = result.statistics.jumps;
     r_.ok = result.ok() && seen_ == of_.samples_.size();
     r_.message = result.message;
-  }
-
-  // Calls f(sample) of those that are read at a time of the run.
-  template <class F>
-  void for_samples_at(std::size_t k, F&& f) const {
-    if (of_.delayed_) return f(k);
-    for (std::size_t i = of_.first_[k]; i < of_.first_[k + 1]; ++i) f(i);
-  }
-
-  void set_residual(std::size_t i, const ChannelNow& c, double s) {
-    const Sample& sample = of_.samples_[i];
-    r_.z(static_cast<Eigen::Index>(i)) =
-        (sample.measured - c.gain.value * s - c.bias.value) / of_.channels_[sample.channel].sigma;
-    ++seen_;
   }
 
   void take(const Mechanism& mechanism, std::size_t i, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
@@ -383,10 +379,13 @@ class Experiment::Reading {
     const ChannelNow& c = of_sample(sample);
     y_bar_.setZero();
     rho_bar_.setZero();
-    const double s = mechanism.add_sensor_gradient(channel.sensor, at, 1, y_bar_, rho_bar_);
+    const double s = limits_.derivatives ? mechanism.add_sensor_gradient(channel.sensor, at, 1, y_bar_, rho_bar_)
+                                         : mechanism.sensor_value(channel.sensor, at);
+    r_.z(static_cast<Eigen::Index>(i)) = (sample.measured - c.gain.value * s - c.bias.value) / channel.sigma;
+    ++seen_;
+    if (!limits_.derivatives) return;
     const bool held = of_.times_[sample.time] - c.delay.value < settings_.start_time;
     const double sdot = of_.delayed_ && !held && !of_.unknowns_.empty() ? y_bar_.dot(*at.ydot) : 0.0;
-    set_residual(i, c, s);
     for (const Unknown& unknown : of_.unknowns_) {
       const int k = unknown.parameter;
       const double s_u = y_bar_.dot(y_rho.col(k)) - sdot * c.delay.rho_bar(k) + rho_bar_(k);

@@ -24,11 +24,30 @@
 #include "core/expression/program.hpp"
 #include "core/mechanism/scene_programs.hpp"
 #include "core/simulate/simulation.hpp"
-#include "optim/fit/state_chart.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt::inline optim {
+
+// Coordinates of the states of a mechanism near one of them, y0, where they are those of the parameters u that set it:
+//
+//   s(y) = W (y' - y0),      W = (Y'Y)^-1 Y',   Y = dy0/du          so that s(y0(u + du)) = du to first order
+//
+// y' is y, with Euler parameters and their rates of each body by the sign that is nearer to y0: both are the same
+// orientation.
+class StateChart {
+ public:
+  // y: (q, v), 14 numbers per body; y_u: its derivatives, of full column rank.
+  StateChart(const Eigen::VectorXd& y, const Eigen::MatrixXd& y_u);
+
+  Eigen::Index size() const { return W_.rows(); }
+  // y_rho: of these columns.
+  void read(const Eigen::VectorXd& y, const Eigen::MatrixXd& y_rho, Eigen::VectorXd& s, Eigen::MatrixXd& s_rho) const;
+
+ private:
+  Eigen::VectorXd y0_;
+  Eigen::MatrixXd W_;
+};
 
 struct ExperimentLimits {
   std::function<bool(double t)> progress;  // after accepted steps; false stops
@@ -46,6 +65,7 @@ class Experiment {
     std::size_t time;  // index in times()
     std::size_t channel;
     double measured;
+    std::size_t row;  // of the data
   };
   struct Residuals {
     bool ok = false;
@@ -62,8 +82,7 @@ class Experiment {
   // rho: values of parameters that are not unknown here (overrides are applied on top). Throws std::invalid_argument
   // and CsvError with the place: "identification.experiments[0].channels[1].sigma: ...".
   Experiment(const Scene& scene, const ExperimentSpec& spec, std::string place, const CsvTable& data,
-             const Eigen::VectorXd& rho, std::vector<Unknown> unknowns,
-             std::vector<std::shared_ptr<const UserForce>> user_forces = {});
+             const Eigen::VectorXd& rho, std::vector<Unknown> unknowns);
 
   using Limits = ExperimentLimits;
   Residuals residuals(const Eigen::VectorXd& u, const Limits& limits = {}) const;
@@ -80,6 +99,7 @@ class Experiment {
   const std::vector<double>& times() const { return times_; }
   const std::vector<Sample>& samples() const { return samples_; }  // by time, then channel
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
+  const std::vector<bool>& active() const { return active_; }  // of the scene's parameters, those that are unknown
   std::size_t channels() const { return channels_.size(); }
   double sigma(std::size_t channel) const { return channels_[channel].sigma; }
   double given_sigma(std::size_t channel) const { return channels_[channel].given_sigma; }
@@ -126,7 +146,6 @@ class Experiment {
   Eigen::VectorXd rho_;
   std::vector<Unknown> unknowns_;
   std::vector<bool> active_;
-  std::vector<std::shared_ptr<const UserForce>> user_forces_;
   std::vector<Channel> channels_;
   std::vector<double> times_;  // at which something was measured
   std::vector<Sample> samples_;

@@ -27,6 +27,12 @@ Index priors_of(const std::vector<UnknownParameter>& unknowns) {
   return std::count_if(unknowns.begin(), unknowns.end(), [](const auto& u) { return u.description.prior.has_value(); });
 }
 
+VariableScaling scaling_of(const std::vector<UnknownParameter>& unknowns) {
+  std::vector<Parameter> parameters;
+  for (const UnknownParameter& u : unknowns) parameters.push_back(u.description);
+  return VariableScaling(parameters);
+}
+
 // f(model, sample) of every sample.
 template <class F>
 VectorXd per_sample(const std::vector<ExperimentStack::Member>& members, F&& f) {
@@ -50,10 +56,7 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, std::vector<Unknow
   x_lower = scaling_.x_lower();
   x_upper = scaling_.x_upper();
   loss = fit_loss;
-  for (std::size_t i = 0; i < unknowns_.size(); ++i)
-    if (const auto& prior = unknowns_[i].description.prior)
-      priors_.push_back({static_cast<Index>(i), prior->mean, prior->sigma});
-  plain = static_cast<Index>(priors_.size());
+  plain = priors_of(unknowns_);
   Index row = 0;
   for (const Member& m : members_) {
     Dependence& part = parts.emplace_back();
@@ -63,15 +66,12 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, std::vector<Unknow
     for (const Experiment::Unknown& unknown : m.model.unknowns()) part.variables.push_back(unknown.at);
   }
   tie();
-  for (const Prior& prior : priors_) {  // beside the samples that depend on its variable
-    const auto depends = [&](const Dependence& part) {
-      return std::ranges::find(part.variables, prior.at) != part.variables.end();
-    };
-    const auto part = std::ranges::find_if(parts, depends);
-    if (part == parts.end())
-      parts.push_back({{row++}, {prior.at}});
-    else
-      part->rows.push_back(row++);
+  for (Index k = 0; k < variables(); ++k) {  // a prior stands beside the samples that depend on its variable
+    if (!unknowns_[static_cast<std::size_t>(k)].description.prior) continue;
+    auto part = std::ranges::find_if(
+        parts, [&](const Dependence& p) { return std::ranges::find(p.variables, k) != p.variables.end(); });
+    if (part == parts.end()) part = parts.insert(part, {{}, {k}});
+    part->rows.push_back(row++);
   }
 }
 
@@ -141,14 +141,20 @@ std::vector<SampledRecord> ExperimentStack::motions_in_time() const {
 }
 
 std::vector<Experiment::Residuals> ExperimentStack::residuals(const VectorXd& u) {
+  constexpr Index kMostNumbers = 50'000;  // of a member: more would fill the memory
   std::vector<Experiment::Residuals> found(members_.size());
-  std::vector<ResidualRecords::Asked> asked;
+  const auto key_of = [&](std::size_t i) {
+    std::vector<double> sigma;
+    for (std::size_t c = 0; c < members_[i].model.channels(); ++c) sigma.push_back(members_[i].model.sigma(c));
+    return std::tuple(i, std::vector<double>(u.begin(), u.end()), std::move(sigma));
+  };
   std::vector<std::size_t> simulated;
   for (std::size_t i = 0; i < members_.size(); ++i) {
-    const Member& m = members_[i];
-    asked.push_back({m.experiment, u, {}});
-    for (std::size_t c = 0; c < m.model.channels(); ++c) asked[i].sigma.push_back(m.model.sigma(c));
-    if (!records || !records->recall(asked[i], found[i])) simulated.push_back(i);
+    const auto known = remembers ? remembered_.find(key_of(i)) : remembered_.end();
+    if (known == remembered_.end())
+      simulated.push_back(i);
+    else
+      found[i] = known->second;
   }
   simulations_ += static_cast<long>(simulated.size());
   on_threads(simulated.size(), threads_, [&](std::size_t job) {
@@ -157,11 +163,11 @@ std::vector<Experiment::Residuals> ExperimentStack::residuals(const VectorXd& u)
     if (m.most_steps > 0) limits.max_steps = kStepGrowth * m.most_steps;
     found[simulated[job]] = m.model.residuals(u, limits);
   });
-  for (std::size_t i = 0; i < members_.size(); ++i)
-    if (found[i].ok) members_[i].most_steps = std::max(members_[i].most_steps, found[i].steps);
-  if (records)
-    for (const std::size_t i : simulated)
-      if (found[i].ok) records->record(asked[i], found[i]);
+  for (const std::size_t i : simulated) {
+    if (!found[i].ok) continue;
+    members_[i].most_steps = std::max(members_[i].most_steps, found[i].steps);
+    if (remembers && found[i].z.size() + found[i].z_u.size() <= kMostNumbers) remembered_[key_of(i)] = found[i];
+  }
   return found;
 }
 
@@ -180,11 +186,11 @@ LeastSquaresPoint ExperimentStack::collected(const std::vector<Experiment::Resid
     point.z_x.middleRows(row, n) = found[i].z_u * u_x.asDiagonal();
     row += n;
   }
-  for (const Prior& p : priors_) {
-    point.z(row) = (u(p.at) - p.mean) / p.sigma;
-    point.z_x(row, p.at) = u_x(p.at) / p.sigma;
-    ++row;
-  }
+  for (Index k = 0; k < u.size(); ++k)
+    if (const auto& prior = unknowns_[static_cast<std::size_t>(k)].description.prior) {
+      point.z(row) = (u(k) - prior->mean) / prior->sigma;
+      point.z_x(row++, k) = u_x(k) / prior->sigma;
+    }
   for (std::size_t i = 0; i + 1 < members_.size(); ++i) {
     if (!members_[i].continues) continue;
     const Index n = found[i].end.size();

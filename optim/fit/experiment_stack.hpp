@@ -5,32 +5,23 @@
 //   z = [ z_1; z_2; ...; (u_k - mean_k)/sigma_k for each unknown with a prior; s(end of e) - s(start of e + 1); ... ]
 //
 // The loss does not see priors. A value free in several experiments has its prior in each. s is the chart of the later
-// experiment's start (state_chart.hpp).
+// experiment's start (experiment.hpp).
 //
 //   ExperimentStack stack(std::move(experiments), unknowns, spec.loss);
 //   LeastSquaresResult fit = solve_least_squares(stack, stack.start());
 #pragma once
 
 #include <functional>
+#include <map>
+#include <tuple>
 #include <vector>
 
 #include "optim/fit/score_variance.hpp"
 #include "optim/fit/unknown_parameters.hpp"
+#include "optim/problem/variable_scaling.hpp"
 #include "optim/solver/least_squares.hpp"
 
 namespace mbsopt::inline optim {
-
-// Keeps the residuals of a fit, so that statistics simulate no point again.
-struct ResidualRecords {
-  struct Asked {
-    std::size_t experiment;  // in the identification
-    const Eigen::VectorXd& u;
-    std::vector<double> sigma;  // per channel
-  };
-  virtual ~ResidualRecords() = default;
-  virtual bool recall(const Asked& asked, Experiment::Residuals& found) = 0;
-  virtual void record(const Asked& asked, const Experiment::Residuals& found) = 0;  // that are ok
-};
 
 class ExperimentStack : public LeastSquaresProblem {
  public:
@@ -65,23 +56,20 @@ class ExperimentStack : public LeastSquaresProblem {
   std::vector<SampledRecord> records_in_time() const;  // one per member, or per chain of those that continue
   std::vector<SampledRecord> motions_in_time() const;  // one per member, with all that follow
   long simulations() const { return simulations_; }
-  ResidualRecords* records = nullptr;
+  bool remembers = false;  // residuals, so that the rounds of a fit simulate no point again
 
  private:
   std::vector<SampledRecord> in_time(const std::function<bool(std::size_t member)>& joins_last) const;
   void tie();
-  struct Prior {
-    Eigen::Index at;
-    double mean, sigma;
-  };
 
   std::vector<Member> members_;
   std::vector<UnknownParameter> unknowns_;
   VariableScaling scaling_;
   std::function<bool(double t)> go_on_;
   int threads_;
-  std::vector<Prior> priors_;
   long simulations_ = 0;
+  // By member, u and the sigmas of its channels.
+  std::map<std::tuple<std::size_t, std::vector<double>, std::vector<double>>, Experiment::Residuals> remembered_;
 };
 
 }  // namespace mbsopt::inline optim

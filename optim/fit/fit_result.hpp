@@ -4,12 +4,10 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "core/force/user_force.hpp"
 #include "optim/fit/residual_analysis.hpp"
 #include "optim/fit/statistics.hpp"
 #include "optim/problem/problem.hpp"
@@ -60,6 +58,7 @@ struct ResidualRow {
   std::size_t experiment = 0, channel = 0;
   double t = 0, measured = 0, model = 0;
   double scaled = 0;                            // z
+  std::size_t row = 0;                          // of the experiment's data
   double prediction = FitStatistics::kUnknown;  // half of the 95 % interval for a measurement there, about the model
 };
 
@@ -93,18 +92,15 @@ struct IdentificationResult {
   bool ok() const { return status == SolverStatus::converged || status == SolverStatus::no_progress; }
 };
 
-struct ResidualRecords;  // optim/fit/experiment_stack.hpp
-
 // Options of an identification that the problem does not give.
 struct IdentificationOptions {
-  std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(const FitRow&)> progress;        // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
   // No step is taken: residuals at the start, and the standard errors that the given sigmas predict there.
   bool preflight = false;
-  bool tests_angles = true;            // fits again where a column may be in degrees
-  int threads = 1;                     // experiments at a time; results do not depend on it
-  ResidualRecords* records = nullptr;  // of the points that were simulated before
+  bool tests_angles = true;  // fits again where a column may be in degrees
+  int threads = 1;           // experiments at a time; results do not depend on it
+  bool remembers = false;    // the residuals of all points, so that none is simulated twice
 };
 
 }  // namespace mbsopt::inline optim

@@ -78,31 +78,30 @@ LeastSquaresResult FitSearch::minimised(const Eigen::VectorXd& x, double loosest
 LeastSquaresResult FitSearch::estimate(const Loss& loss, const Eigen::VectorXd& x) {
   stack_.loss = loss;
   if (!estimates_sigma(fit_.spec)) return minimised(x);
-  SigmaEstimation sigmas(stack_, fit_.spec);
-  return loss.type == LossType::squared ? best_without_sigmas(sigmas, x) : in_turn_with_sigmas(sigmas, x);
+  return loss.type == LossType::squared ? best_without_sigmas(x) : in_turn_with_sigmas(x);
 }
 
 // The better one of two optima of the likelihood (sigma_estimation.hpp). A search that ends elsewhere leaves no
 // history.
-LeastSquaresResult FitSearch::best_without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x) {
-  const std::vector<double> given = sigmas.sigmas(), noise = sigmas.noise();
-  LeastSquaresResult free = without_sigmas(sigmas, x);
+LeastSquaresResult FitSearch::best_without_sigmas(const Eigen::VectorXd& x) {
+  const std::vector<double> given = sigmas_.sigmas(), noise = sigmas_.noise();
+  LeastSquaresResult free = without_sigmas(x);
   if (!fit_.sigmas_are_estimated || fit_.options.preflight) return free;
-  const std::vector<double> found = sigmas.sigmas();
+  const std::vector<double> found = sigmas_.sigmas();
   if (std::ranges::equal(found, noise, [](double s, double least) { return s <= kNoisy * least; })) return free;
-  const double likelihood = sigmas.likelihood(free.point.z);
+  const double likelihood = sigmas_.likelihood(free.point.z);
   const std::size_t rows = fit_.result.history.size();
   std::vector<double> first = noise;
   for (std::size_t g = 0; g < first.size(); ++g)
-    if (sigmas.is_given(g)) first[g] = given[g];
-  const std::optional<Eigen::VectorXd> known = released_if_linear(sigmas, free, first, x);
+    if (sigmas_.is_given(g)) first[g] = given[g];
+  const std::optional<Eigen::VectorXd> known = released_if_linear(free, first, x);
   if (known && known->size() == 0) return free;
-  sigmas.set(first);
-  LeastSquaresResult released = without_sigmas(sigmas, known ? *known : minimised(x, kGuess).x);
-  if (fit_.sigmas_are_estimated && sigmas.likelihood(released.point.z) < likelihood) return released;
+  sigmas_.set(first);
+  LeastSquaresResult released = without_sigmas(known ? *known : minimised(x, kGuess).x);
+  if (fit_.sigmas_are_estimated && sigmas_.likelihood(released.point.z) < likelihood) return released;
   fit_.result.history.resize(rows);
   apart_.resize(rows);
-  sigmas.set(found);
+  sigmas_.set(found);
   fit_.sigmas_are_estimated = true;
   return free;
 }
@@ -110,43 +109,43 @@ LeastSquaresResult FitSearch::best_without_sigmas(SigmaEstimation& sigmas, const
 // If residuals are linear in the parameters, their derivatives at one optimum tell the other one: no simulation is
 // needed. They are linear if they explain those at the start, x. Returns the other optimum, empty if it is the same
 // one.
-std::optional<Eigen::VectorXd> FitSearch::released_if_linear(SigmaEstimation& sigmas, const LeastSquaresResult& free,
+std::optional<Eigen::VectorXd> FitSearch::released_if_linear(const LeastSquaresResult& free,
                                                              const std::vector<double>& first,
-                                                             const Eigen::VectorXd& x) const {
+                                                             const Eigen::VectorXd& x) {
   const Eigen::VectorXd moved = x.cwiseMax(stack_.x_lower).cwiseMin(stack_.x_upper) - free.x;
   const Eigen::VectorXd change = residuals_at_start() - free.point.z;
   const bool is_linear = change.norm() > kFarApart * free.point.z.norm() &&
                          (change - free.point.z_x * moved).norm() <= kLinear * change.norm();
   if (!is_linear || stack_.equalities > 0) return std::nullopt;
   LinearStack linear(stack_, free);
-  const std::vector<double> found = sigmas.sigmas();
-  sigmas.set(first);
+  const std::vector<double> found = sigmas_.sigmas();
+  sigmas_.set(first);
   LeastSquaresOptions solver = solver_options(fit_);
   const Eigen::VectorXd guess = solve_least_squares(linear, free.x, solver).x;
-  linear.groups = sigmas.scale_groups();
+  linear.groups = sigmas_.scale_groups();
   const LeastSquaresResult released = solve_least_squares(linear, guess, solver);
   LeastSquaresPoint same = free.point;
   linear.evaluate(free.x, same);
   const bool is_better = released.cost_final < linear.cost(same.z) - kSameOptimum;
-  sigmas.set(found);
+  sigmas_.set(found);
   return is_better ? released.x : Eigen::VectorXd();
 }
 
-LeastSquaresResult FitSearch::without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x) {
-  stack_.groups = sigmas.scale_groups();
+LeastSquaresResult FitSearch::without_sigmas(const Eigen::VectorXd& x) {
+  stack_.groups = sigmas_.scale_groups();
   LeastSquaresResult solution = minimised(x);
   stack_.groups.clear();
   fit_.sigmas_are_estimated =
       solution.status == SolverStatus::converged || solution.status == SolverStatus::no_progress;
-  if (fit_.sigmas_are_estimated) take(sigmas, solution);
+  if (fit_.sigmas_are_estimated) take(solution);
   if (solution.point.z.size() > 0) solution.cost_final = stack_.cost(solution.point.z);
   return solution;
 }
 
 // The sigmas by the residuals of the solution, which are by these sigmas then. Returns the largest change.
-double FitSearch::take(SigmaEstimation& sigmas, LeastSquaresResult& solution) const {
+double FitSearch::take(LeastSquaresResult& solution) {
   const Eigen::VectorXd before = stack_.sigma();
-  const double change = sigmas.take(solution.point.z);
+  const double change = sigmas_.take(solution.point.z);
   const Eigen::ArrayXd factor = before.cwiseQuotient(stack_.sigma()).array();
   solution.point.z.head(stack_.samples()).array() *= factor;
   solution.point.z_x.topRows(stack_.samples()).array().colwise() *= factor;
@@ -154,10 +153,10 @@ double FitSearch::take(SigmaEstimation& sigmas, LeastSquaresResult& solution) co
   return change;
 }
 
-LeastSquaresResult FitSearch::in_turn_with_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x) {
+LeastSquaresResult FitSearch::in_turn_with_sigmas(const Eigen::VectorXd& x) {
   LeastSquaresResult solution = minimised(x);
   for (int round = 0; solution.status == SolverStatus::converged; ++round) {
-    const double change = take(sigmas, solution);
+    const double change = take(solution);
     fit_.sigmas_are_estimated = change < kSigmaChange || round == kSigmaRounds;
     if (round == kSigmaRounds && change >= kSigmaChange)
       solution.message += fmt::format("; estimated sigmas still change by {:.1g} of themselves", change);

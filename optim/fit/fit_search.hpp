@@ -18,28 +18,30 @@ namespace mbsopt::inline optim {
 
 class FitSearch {
  public:
-  FitSearch(FitContext& fit, ExperimentStack& stack) : fit_(fit), stack_(stack) {}
+  FitSearch(FitContext& fit, ExperimentStack& stack) : fit_(fit), stack_(stack), sigmas_(stack, fit.spec) {}
 
   LeastSquaresResult solved();
   // Fills the costs of result.history, cost_initial and cost_final by the sigmas, the loss and the multipliers of the
   // end.
   void measure_costs_by_the_end(double cost_final);
   Eigen::VectorXd residuals_at_start() const { return by_sigmas(apart_.front()); }
+  const SigmaEstimation& sigmas() const { return sigmas_; }
 
  private:
   LeastSquaresResult estimate(const Loss& loss, const Eigen::VectorXd& x);
-  LeastSquaresResult without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
-  LeastSquaresResult best_without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
-  std::optional<Eigen::VectorXd> released_if_linear(SigmaEstimation& sigmas, const LeastSquaresResult& free,
-                                                    const std::vector<double>& first, const Eigen::VectorXd& x) const;
-  LeastSquaresResult in_turn_with_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
+  LeastSquaresResult without_sigmas(const Eigen::VectorXd& x);
+  LeastSquaresResult best_without_sigmas(const Eigen::VectorXd& x);
+  std::optional<Eigen::VectorXd> released_if_linear(const LeastSquaresResult& free, const std::vector<double>& first,
+                                                    const Eigen::VectorXd& x);
+  LeastSquaresResult in_turn_with_sigmas(const Eigen::VectorXd& x);
   LeastSquaresResult minimised(const Eigen::VectorXd& x, double loosest = 0);  // tolerance: at least it
-  double take(SigmaEstimation& sigmas, LeastSquaresResult& solution) const;
+  double take(LeastSquaresResult& solution);
   bool cost_changes() const;
   Eigen::VectorXd by_sigmas(Eigen::VectorXd apart) const;
 
   FitContext& fit_;
   ExperimentStack& stack_;
+  SigmaEstimation sigmas_;
   // measured - model, then the residuals of the priors, for each row of the history. One row suffices if the cost does
   // not change on the way.
   std::vector<Eigen::VectorXd> apart_;

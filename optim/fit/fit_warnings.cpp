@@ -69,9 +69,8 @@ class FitWarnings {
     std::string places;
     int parts = 0;
     const auto place = [&](Eigen::Index i) {
-      const std::size_t e = fit_.result.residuals[static_cast<std::size_t>(i)].experiment;
-      const std::vector<double>& t = fit_.data[e].column(fit_.spec.experiments[e].time);
-      return fit_.data[e].place(static_cast<std::size_t>(std::ranges::lower_bound(t, time(i)) - t.begin()));
+      const ResidualRow& sample = fit_.result.residuals[static_cast<std::size_t>(i)];
+      return fit_.data[sample.experiment].place(sample.row);
     };
     for (std::size_t i = 0, k = 0; i < s.taken_out.size(); i = k + 1) {
       const auto kept_before = [&](Eigen::Index x) { return std::ranges::lower_bound(s.rows, x) - s.rows.begin(); };
@@ -248,8 +247,7 @@ std::vector<DegreesCandidate> degrees_candidates(const FitContext& fit, const st
                                                  const ExperimentStack& stack, const Eigen::VectorXd& z_start) {
   std::vector<DegreesCandidate> candidates;
   for (const ChannelRecord& s : records) {
-    const auto sensor = std::ranges::find(fit.scene.sensors, s.sensor, &Sensor::name);
-    const std::string unit = unit_of(fit.scene, *sensor);
+    const std::string unit = unit_of(fit.scene, *std::ranges::find(fit.scene.sensors, s.sensor, &Sensor::name));
     const bool is_stated =
         !stated_unit(fit.spec.experiments[s.experiment].channels[s.channel], fit.data[s.experiment]).empty();
     if ((unit != "rad" && unit != "rad/s") || is_stated || s.rows.size() < 2) continue;

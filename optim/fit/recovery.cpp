@@ -29,16 +29,9 @@ std::vector<ResampledChannel> records_of(const Problem& problem, const std::vect
   std::vector<ResampledChannel> records;
   for (const auto& [e, c] : channels.all)
     records.push_back({data[e].find_column(experiments[e].channels[c].column), {}, {}, {}});
-  std::size_t row = 0, experiment = 0;
-  for (const ResidualRow& sample : fit.residuals) {  // by experiment, then time
-    if (sample.experiment != experiment) {
-      experiment = sample.experiment;
-      row = 0;
-    }
-    const std::vector<double>& t = data[experiment].column(experiments[experiment].time);
-    while (row + 1 < t.size() && t[row] < sample.t) ++row;
-    ResampledChannel& record = records[channels.first[experiment] + sample.channel];
-    record.rows.emplace_back(experiment, row);
+  for (const ResidualRow& sample : fit.residuals) {
+    ResampledChannel& record = records[channels.first[sample.experiment] + sample.channel];
+    record.rows.emplace_back(sample.experiment, sample.row);
     record.model.push_back(sample.model);
     record.noise.push_back(sample.measured - sample.model);
   }
@@ -50,9 +43,8 @@ std::vector<ResampledChannel> records_of(const Problem& problem, const std::vect
   const double larger = left > 0 ? std::sqrt(N / left) : 1;
   for (ResampledChannel& record : records) {
     if (record.noise.empty()) continue;
-    const double mean =
-        Eigen::Map<const Eigen::ArrayXd>(record.noise.data(), static_cast<Eigen::Index>(record.noise.size())).mean();
-    for (double& noise : record.noise) noise = larger * (noise - mean);
+    Eigen::Map<Eigen::ArrayXd> noise(record.noise.data(), std::ssize(record.noise));
+    noise = larger * (noise - noise.mean());
   }
   return records;
 }
@@ -101,15 +93,12 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
     std::mt19937 generator(static_cast<unsigned>(job + 1));
     std::vector<CsvTable> simulated = data;
     for (const ResampledChannel& record : records) {
-      const double blocks = in_blocks ? kLagPart : 0;
-      const std::size_t block =
-          std::max<std::size_t>(1, static_cast<std::size_t>(blocks * static_cast<double>(record.rows.size())));
-      simulate_noise(record, block, generator, simulated);
+      const auto block = static_cast<std::size_t>(kLagPart * static_cast<double>(record.rows.size()));
+      simulate_noise(record, in_blocks ? std::max<std::size_t>(1, block) : 1, generator, simulated);
     }
     Problem again = problem;
     keep_fitted(again, simulated);
     IdentificationOptions identification;
-    identification.user_forces = options.user_forces;
     identification.simulation_progress = [&](double t) {
       const std::scoped_lock lock(progress_lock);
       if (options.simulation_progress && !options.simulation_progress(t)) stopped = true;
@@ -122,29 +111,27 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
 
   const std::size_t P = fit.parameters.size();
   std::vector<std::vector<double>> found(P);
-  std::vector<int> held(P, 0);
   Recovery recovery;
+  for (const FittedParameter& p : fit.parameters) recovery.parameters.push_back({p.name, p.unit, p.value});
   for (const IdentificationResult& result : results) {
     if (result.parameters.empty() || result.status == SolverStatus::stopped) continue;
     result.ok() ? ++recovery.fits : ++recovery.failed;
     for (std::size_t k = 0; result.ok() && k < P; ++k) {
       const FittedParameter& p = result.parameters[k];
       const double truth = fit.parameters[k].value;
-      found[k].push_back(p.value), held[k] += p.ci95[0] <= truth && truth <= p.ci95[1];
+      found[k].push_back(p.value);
+      recovery.parameters[k].share += p.ci95[0] <= truth && truth <= p.ci95[1];
     }
   }
-  if (recovery.fits < 2) return recovery;
-  for (std::size_t k = 0; k < P; ++k) {
+  if (recovery.fits < 2) recovery.parameters.clear();
+  for (std::size_t k = 0; k < recovery.parameters.size(); ++k) {
+    RecoveredParameter& p = recovery.parameters[k];
     const Eigen::Map<const Eigen::ArrayXd> values(found[k].data(), recovery.fits);
-    const FittedParameter& p = fit.parameters[k];
-    const double mean = values.mean(), scatter = std::sqrt((values - mean).square().sum() / (recovery.fits - 1));
-    recovery.parameters.push_back({p.name,
-                                   p.unit,
-                                   p.value,
-                                   mean,
-                                   scatter,
-                                   static_cast<double>(held[k]) / recovery.fits,
-                                   {percentile(found[k], 0.025), percentile(found[k], 0.975)}});
+    p.mean = values.mean();
+    p.scatter = std::sqrt((values - p.mean).square().sum() / (recovery.fits - 1));
+    p.share /= recovery.fits;
+    p.ci95[0] = percentile(found[k], 0.025);
+    p.ci95[1] = percentile(found[k], 0.975);
   }
   return recovery;
 }

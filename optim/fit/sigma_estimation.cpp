@@ -20,9 +20,9 @@ bool has_sigma(const ChannelSpec& channel) {
 }
 
 bool estimates_sigma(const IdentificationSpec& spec) {
-  return std::any_of(spec.experiments.begin(), spec.experiments.end(), [](const ExperimentSpec& e) {
-    return !e.validate && std::any_of(e.channels.begin(), e.channels.end(),
-                                      [](const ChannelSpec& c) { return c.estimate_sigma != SigmaEstimate::none; });
+  return std::ranges::any_of(spec.experiments, [](const ExperimentSpec& e) {
+    const auto estimated = [](const ChannelSpec& c) { return c.estimate_sigma != SigmaEstimate::none; };
+    return !e.validate && std::ranges::any_of(e.channels, estimated);
   });
 }
 

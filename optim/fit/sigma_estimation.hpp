@@ -45,6 +45,7 @@ class SigmaEstimation {
   // Gives all channels of a shared sigma that of the first one. stack must outlive it.
   SigmaEstimation(ExperimentStack& stack, const IdentificationSpec& spec);
 
+  std::size_t size() const { return groups_.size(); }
   std::vector<ScaleGroup> scale_groups() const;
   // Sets the sigmas by residuals z, which are by the sigmas so far. Returns the largest change, relative.
   double take(const Eigen::VectorXd& z);

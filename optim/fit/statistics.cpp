@@ -65,12 +65,6 @@ MatrixXd null_space_of(const MatrixXd& C) {
   return orthogonal_factor(C.transpose(), C.cols()).rightCols(C.cols() - C.rows());
 }
 
-MatrixXd scores_of(const VectorXd& z, const MatrixXd& J) {
-  MatrixXd scores = z.asDiagonal() * J;
-  scores.rowwise() -= scores.colwise().mean().eval();  // zero but for the pull of priors and of bounds
-  return scores;
-}
-
 // V V' where `held` rows of V stay zero.
 MatrixXd inverse_without(const MatrixXd& V, const std::vector<Index>& held) {
   if (held.empty()) return V * V.transpose();
@@ -138,7 +132,8 @@ MatrixXd sandwich_covariance(const FitData& data, const ScoreVariance& scores_va
   };
   const MatrixXd q = scaled * V, inverse = V * V.transpose(), a_J = scaled.topRows(N) * inverse;
   const VectorXd z = influences_of(data).scaled();
-  const MatrixXd scores = scores_of(z, scaled.topRows(N));
+  MatrixXd scores = z.asDiagonal() * scaled.topRows(N);
+  scores.rowwise() -= scores.colwise().mean().eval();  // zero but for the pull of priors and of bounds
   const MatrixXd within = inverse * scores_vary.within(scores) * inverse;
   VectorXd left_out;
   if (scores_vary.has_windows()) {
@@ -243,16 +238,10 @@ FitStatistics fit_statistics(const FitData& data) {
 }
 
 std::string FitStatistics::covariance_in_words() const {
-  switch (covariance_type) {
-    case CovarianceType::newey_west:
-      return "for residuals that are correlated in time (Newey and West), over up to a tenth of each record";
-    case CovarianceType::windows:
-      return "for residuals that are independent between experiments only";
-    case CovarianceType::white:
-    case CovarianceType::automatic:
-      break;
-  }
-  return "for residuals that are white";
+  return covariance_type == CovarianceType::newey_west
+             ? "for residuals that are correlated in time (Newey and West), over up to a tenth of each record"
+         : covariance_type == CovarianceType::windows ? "for residuals that are independent between experiments only"
+                                                      : "for residuals that are white";
 }
 
 void withhold_errors(FitStatistics& statistics, std::string why) {

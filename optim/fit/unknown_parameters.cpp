@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -42,11 +41,8 @@ RecordChannels record_channels(const IdentificationSpec& spec) {
 }
 
 void set_override(ExperimentSpec& experiment, const std::string& parameter, double value) {
-  const auto found = std::ranges::find(experiment.overrides, parameter, &std::pair<std::string, double>::first);
-  if (found != experiment.overrides.end())
-    found->second = value;
-  else
-    experiment.overrides.emplace_back(parameter, value);
+  std::erase_if(experiment.overrides, [&](const auto& given) { return given.first == parameter; });
+  experiment.overrides.emplace_back(parameter, value);
 }
 
 bool is_held(const Parameter& p) {
@@ -71,13 +67,13 @@ std::vector<UnknownParameter> unknowns_of_fit(const Scene& scene, const Identifi
   if (!spec.variables.empty())
     for (const int k : parameter_indices(scene, spec.variables)) {
       UnknownParameter u{k, 0, true, scene.parameters[static_cast<std::size_t>(k)]};
+      const std::string& name = u.description.name;
       const auto uses_it = [&](const ExperimentSpec& e) {
-        const bool freed = std::find(e.free.begin(), e.free.end(), u.description.name) != e.free.end();
-        return !e.validate && !freed && !override_of(e, u.description.name);
+        return !e.validate && std::ranges::find(e.free, name) == e.free.end() && !override_of(e, name);
       };
-      if (std::none_of(spec.experiments.begin(), spec.experiments.end(), uses_it))
-        throw std::invalid_argument(fmt::format(
-            "identification.variables: '{}' is free or overridden in every fitted experiment", u.description.name));
+      if (std::ranges::none_of(spec.experiments, uses_it))
+        throw std::invalid_argument(
+            fmt::format("identification.variables: '{}' is free or overridden in every fitted experiment", name));
       if (!is_held(u.description)) unknowns.push_back(std::move(u));
     }
   for (std::size_t e = 0; e < spec.experiments.size(); ++e) {
@@ -98,8 +94,7 @@ std::vector<Experiment::Unknown> unknowns_in(const Scene& scene, const Identific
   const std::vector<UnknownParameter> freed = free_in(scene, spec, experiment);
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const UnknownParameter& u = unknowns[i];
-    const bool is_free =
-        std::any_of(freed.begin(), freed.end(), [&](const auto& f) { return f.parameter == u.parameter; });
+    const bool is_free = std::ranges::find(freed, u.parameter, &UnknownParameter::parameter) != freed.end();
     const bool overridden = override_of(spec.experiments[experiment], u.description.name) != nullptr;
     if (u.shared ? !is_free && !overridden : u.experiment == experiment)
       here.push_back({u.parameter, static_cast<Eigen::Index>(i)});
@@ -110,18 +105,6 @@ std::vector<Experiment::Unknown> unknowns_in(const Scene& scene, const Identific
 std::string name_of(const UnknownParameter& unknown, const IdentificationSpec& spec) {
   const std::string& name = unknown.description.name;
   return unknown.shared ? name : spec.experiments[unknown.experiment].name + "." + name;
-}
-
-std::vector<std::string> names_of(const std::vector<UnknownParameter>& unknowns, const IdentificationSpec& spec) {
-  std::vector<std::string> names;
-  for (const UnknownParameter& u : unknowns) names.push_back(name_of(u, spec));
-  return names;
-}
-
-VariableScaling scaling_of(const std::vector<UnknownParameter>& unknowns) {
-  std::vector<Parameter> parameters;
-  for (const UnknownParameter& u : unknowns) parameters.push_back(u.description);
-  return VariableScaling(parameters);
 }
 
 Eigen::VectorXd start_of(const std::vector<UnknownParameter>& unknowns) {

@@ -1,8 +1,9 @@
 // The unknowns of an identification: parameters shared by its experiments, and those with a value per experiment.
 //
-//   const std::vector<UnknownParameter> unknowns = unknowns_of_fit(scene, spec);   // "k1", "run1.theta0",
-//   "run2.theta0" const VariableScaling scaling = scaling_of(unknowns); Experiment run1(..., unknowns_in(scene, spec,
-//   0, unknowns));                   // those that act in experiment 0
+// clang-format off
+//   const std::vector<UnknownParameter> unknowns = unknowns_of_fit(scene, spec);   // "k1", "run1.theta0", "run2.theta0"
+//   Experiment run1(..., unknowns_in(scene, spec, 0, unknowns));                   // those that act in experiment 0
+// clang-format on
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +12,6 @@
 
 #include "optim/fit/experiment.hpp"
 #include "optim/problem/problem.hpp"
-#include "optim/problem/variable_scaling.hpp"
 
 namespace mbsopt::inline optim {
 
@@ -52,8 +52,6 @@ std::vector<Experiment::Unknown> unknowns_in(const Scene& scene, const Identific
                                              const std::vector<UnknownParameter>& unknowns);
 
 std::string name_of(const UnknownParameter& unknown, const IdentificationSpec& spec);  // "run1.theta0"
-std::vector<std::string> names_of(const std::vector<UnknownParameter>& unknowns, const IdentificationSpec& spec);
-VariableScaling scaling_of(const std::vector<UnknownParameter>& unknowns);
 Eigen::VectorXd start_of(const std::vector<UnknownParameter>& unknowns);
 
 }  // namespace mbsopt::inline optim

@@ -23,7 +23,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using UserForces = std::vector<std::shared_ptr<const UserForce>>;
 
 // A polynomial reaches so far to both sides of its time, in lengths of a window. It takes at least so many samples,
 // twice its coefficients.
@@ -44,9 +43,9 @@ class LocalPolynomial {
     std::vector<std::pair<double, double>> near;  // by distance
     for (std::size_t i = 0; i < t.size(); ++i)
       if (!std::isnan(measured[i])) near.emplace_back(t[i] - centre, measured[i]);
-    std::ranges::stable_sort(near, {}, [](const auto& sample) { return std::abs(sample.first); });
-    const auto beyond = std::ranges::find_if(near, [&](const auto& s) { return std::abs(s.first) > reach; });
-    const std::size_t within = static_cast<std::size_t>(beyond - near.begin());
+    const auto distance = [](const auto& sample) { return std::abs(sample.first); };
+    std::ranges::stable_sort(near, {}, distance);
+    const auto within = static_cast<std::size_t>(std::ranges::upper_bound(near, reach, {}, distance) - near.begin());
     near.resize(std::min(near.size(), std::max(within, kLeastSamples)));
     reach_ = std::max(reach_, std::abs(near.back().first));
     const Index n = static_cast<Index>(near.size());
@@ -85,20 +84,15 @@ CsvTable rows_between(const CsvTable& data, const std::vector<double>& t, double
 class Cut {
  public:
   Cut(const Scene& scene, const ExperimentSpec& whole, std::string place, const CsvTable& data,
-      const UserForces& user_forces, const std::function<bool(double t)>& go_on)
-      : scene_(scene),
-        whole_(whole),
-        place_(std::move(place)),
-        data_(data),
-        t_(ascending_times(data, whole.time)),
-        user_forces_(user_forces) {
+      const std::function<bool(double t)>& go_on)
+      : scene_(scene), whole_(whole), place_(std::move(place)), data_(data), t_(ascending_times(data, whole.time)) {
     if (go_on) go_on_ = [this, &go_on](double t) { return abandoned_ = abandoned_ || !go_on(t), !abandoned_; };
   }
 
   void add_to(CutProblem& cut) {
     const std::string place = place_ + ".windows";
     // Errors of the whole experiment, once.
-    const Experiment all(scene_, without_windows(), place_, data_, parameter_values(scene_), {}, user_forces_);
+    const Experiment all(scene_, without_windows(), place_, data_, parameter_values(scene_), {});
     const double length = whole_.windows->length;
     const double start = whole_.windows->start_time.value_or(all.start_time());
     const double end = std::min(whole_.windows->end_time.value_or(all.end_time()), all.end_time());
@@ -147,11 +141,11 @@ class Cut {
     const std::vector<UnknownParameter> unknowns = free_in(scene_, alone, 0);
     const std::vector<Experiment::Unknown> here = unknowns_in(scene_, alone, 0, unknowns);
     const VectorXd rho = parameter_values(scene_);
-    const Experiment model(scene_, window, place_, rows, rho, here, user_forces_);
+    const Experiment model(scene_, window, place_, rows, rho, here);
     require_starts(model);
     alone.experiments[0].end_time.reset(), alone.experiments[0].origin->continues = false;
     std::vector<ExperimentStack::Member> members;
-    members.push_back({0, Experiment(scene_, alone.experiments[0], place_, smoothed(model), rho, here, user_forces_)});
+    members.push_back({0, Experiment(scene_, alone.experiments[0], place_, smoothed(model), rho, here)});
     ExperimentStack stack(std::move(members), unknowns, {}, go_on_);
     LeastSquaresOptions options;
     options.tolerance = 1e-6;  // of a guess
@@ -170,10 +164,7 @@ class Cut {
   // Each free parameter of a window must act on its start, since samples there say nothing of the others.
   void require_starts(const Experiment& model) const {
     const Scene scene = model.simulated();
-    std::vector<bool> active(scene.parameters.size(), false);
-    for (const Experiment::Unknown& unknown : model.unknowns())
-      active[static_cast<std::size_t>(unknown.parameter)] = true;
-    const Assembly assembly(Mechanism(scene, parameter_values(scene), active, user_forces_), model.start_time());
+    const Assembly assembly(Mechanism(scene, parameter_values(scene), model.active()), model.start_time());
     if (!assembly.result().ok)
       throw std::invalid_argument(
           fmt::format("{}.windows: the mechanism cannot be assembled at the start of a "
@@ -186,27 +177,23 @@ class Cut {
                       "mechanism, {} numbers; "
                       "the experiment's free parameters are {}",
                       place_, 2 * degrees, model.unknowns().size()));
-    const MatrixXd tangent = assembly.tangent();
-    if (whole_.windows->continuity) require_all_motions(model, tangent, degrees);
-    for (const Experiment::Unknown& unknown : model.unknowns())
-      if (tangent.col(unknown.parameter).isZero(0))
+    std::vector<Index> columns;
+    for (const Experiment::Unknown& unknown : model.unknowns()) columns.push_back(unknown.parameter);
+    const MatrixXd y_u = assembly.tangent()(Eigen::all, columns);
+    if (whole_.windows->continuity) require_all_motions(y_u, degrees);
+    for (Index k = 0; k < y_u.cols(); ++k)
+      if (y_u.col(k).isZero(0))
         throw std::invalid_argument(fmt::format(
             "{}.free: '{}' does not act on the initial state; in an experiment with windows only start parameters can "
             "be free, each window has a value of its own",
-            place_, scene.parameters[static_cast<std::size_t>(unknown.parameter)].name));
+            place_, scene.parameters[static_cast<std::size_t>(columns[static_cast<std::size_t>(k)])].name));
   }
 
   // Windows that continue each other meet in all coordinates and rates.
-  void require_all_motions(const Experiment& model, const MatrixXd& tangent, int degrees) const {
-    std::vector<Index> columns;
-    for (const Experiment::Unknown& unknown : model.unknowns()) columns.push_back(unknown.parameter);
-    MatrixXd y_u = tangent(Eigen::all, columns);
-    for (Index k = 0; k < y_u.cols(); ++k)
-      if (const double norm = y_u.col(k).norm(); norm > 0) y_u.col(k) /= norm;
-    const auto rank_of = [](const MatrixXd& A) {
-      return static_cast<int>(OrthogonalDecomposition(A, kSameStart).rank());
-    };
-    const int all = rank_of(y_u), coordinates = rank_of(y_u.topRows(y_u.rows() / 2));
+  void require_all_motions(MatrixXd y_u, int degrees) const {
+    for (Index k = 0; k < y_u.cols(); ++k) y_u.col(k).normalize();
+    const auto rank_of = [](const MatrixXd& A) { return OrthogonalDecomposition(A, kSameStart).rank(); };
+    const Index all = rank_of(y_u), coordinates = rank_of(y_u.topRows(y_u.rows() / 2));
     if (all == 2 * degrees) return;
     throw std::invalid_argument(
         fmt::format("{}.windows.continuity: needs a start that is free in all coordinates and rates of the mechanism, "
@@ -250,14 +237,13 @@ class Cut {
   const std::string place_;
   const CsvTable& data_;
   const std::vector<double>& t_;
-  const UserForces& user_forces_;
   std::function<bool(double t)> go_on_;
   bool abandoned_ = false;
 };
 
 }  // namespace
 
-CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>& data, const UserForces& user_forces,
+CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>& data,
                             const std::function<bool(double t)>& go_on) {
   if (!problem.identification || data.size() != problem.identification->experiments.size()) return {problem, data, {}};
   CutProblem cut{problem, {}, {}};
@@ -265,7 +251,7 @@ CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>&
   cut.problem.identification->experiments.clear();
   for (std::size_t e = 0; e < data.size(); ++e) {
     if (spec.experiments[e].windows) {
-      Cut(problem.scene, spec.experiments[e], place_of(spec, e), data[e], user_forces, go_on).add_to(cut);
+      Cut(problem.scene, spec.experiments[e], place_of(spec, e), data[e], go_on).add_to(cut);
     } else {
       cut.problem.identification->experiments.push_back(spec.experiments[e]);
       cut.problem.identification->experiments.back().place = place_of(spec, e);

@@ -11,11 +11,9 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "core/force/user_force.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
@@ -30,7 +28,6 @@ struct CutProblem {
 // A problem without windows remains as it is. go_on: within a simulation; false leaves the other starts as they are
 // given. Throws std::invalid_argument and CsvError with the place.
 CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>& data,
-                            const std::vector<std::shared_ptr<const UserForce>>& user_forces = {},
                             const std::function<bool(double t)>& go_on = {});
 
 }  // namespace mbsopt::inline optim

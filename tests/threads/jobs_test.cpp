@@ -3,7 +3,6 @@
 #include <string>
 #include <vector>
 
-#include "optim/fit/fit_start.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
 #include "optim/objective/evaluator.hpp"

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "optim/design/design.hpp"
-#include "optim/fit/fit_start.hpp"
+#include "optim/fit/identification.hpp"
 #include "tests/optim/five_bar.hpp"
 #include "tests/optim/pendulum.hpp"
 

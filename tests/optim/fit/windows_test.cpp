@@ -122,7 +122,7 @@ TEST_CASE("windows: the guesses of starts end on request", "[identification][win
   const Problem p = windowed();
   const CsvTable data = motion(p, 0);
   int asked = 0;
-  const CutProblem cut = cut_into_windows(p, {data}, {}, [&](double) { return ++asked < 3; });
+  const CutProblem cut = cut_into_windows(p, {data}, [&](double) { return ++asked < 3; });
   CHECK(asked == 3);
   CHECK(cut.warnings.empty());
   REQUIRE(cut.problem.identification->experiments.size() == 4);
