@@ -1,4 +1,4 @@
-"""Work-precision curves of a sweep, as optim/tradeoff/tradeoff_table sees them: lines, whether they are monotone, where
+"""Work-precision curves of a sweep, as optim/tradeoff/tradeoff.hpp sees them: lines, whether they are monotone, where
 an error rises along one, and why."""
 
 import math

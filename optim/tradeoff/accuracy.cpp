@@ -80,19 +80,6 @@ class Chooser {
     return runs_.motion(settings, options_.limit);
   }
 
-  // A run much more exact than one at rtol; better than one at the existing tolerance.
-  Answer verifying(double rtol, double there_is) {
-    Answer verified;
-    for (const double tighter : {kTighter, 0.1 * kTighter}) {
-      const SimulationSettings tight = with_tolerance(base_, verifier_, rounded(rtol / tighter));
-      if (tight.integrator.rtol >= there_is) break;
-      verified = answer(tight);
-      if (verified.ok) result_.verified_by = tight.integrator;
-      if (verified.ok || interrupted()) break;
-    }
-    return verified;
-  }
-
   SimulationSettings settings_at(const char* method, double rtol, long max_steps) const {
     SimulationSettings settings = with_tolerance(base_, method, rounded(std::clamp(rtol, kTightest, kLoosest)));
     settings.integrator.max_steps = std::min(max_steps, settings.integrator.max_steps);
@@ -194,10 +181,18 @@ class Chooser {
   // Renews the right answer if it is not much more exact than runs at rtol. Returns the failed run if there is none.
   std::optional<Answer> renew(std::optional<Answer>& right, double& right_rtol, double rtol) {
     if (right && right_rtol <= 1.01 * rtol / kTighter) return {};
-    Answer verified = verifying(rtol, right_rtol);
-    if (verified.ok) {
-      right = std::move(verified);
-      right_rtol = result_.verified_by.rtol;
+    Answer verified;
+    for (const double tighter : {kTighter, 0.1 * kTighter}) {
+      const SimulationSettings tight = with_tolerance(base_, verifier_, rounded(rtol / tighter));
+      if (tight.integrator.rtol >= right_rtol) break;
+      verified = answer(tight);
+      if (verified.ok) {
+        result_.verified_by = tight.integrator;
+        right_rtol = tight.integrator.rtol;
+        right = std::move(verified);
+        break;
+      }
+      if (interrupted()) break;
     }
     return right ? std::nullopt : std::optional(std::move(verified));
   }

@@ -63,7 +63,7 @@ Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quan
     double largest = certificate;
     for (const std::size_t q : advice.quantities) {
       const std::optional<std::size_t> row = row_with(tradeoff, i, all[q].kind);
-      const double b = row ? tradeoff.rows[*row].bounds(static_cast<Eigen::Index>(q)) : kNaN;
+      const double b = row ? tradeoff.rows[*row].bound(q) : kNaN;
       largest = std::isfinite(b) ? std::max(largest, b) : kInfinity;
     }
     return largest;
@@ -100,9 +100,8 @@ TaskAdviser::TaskAdviser(const Problem& problem, const Tradeoff& tradeoff, const
   std::ptrdiff_t missing = 0;
   for (std::size_t q = 0; q < all.size(); ++q) {
     if (!is_followed(all[q])) continue;
-    const bool is_gradient = all[q].kind == QuantityKind::gradient;
-    if (is_gradient) quantities_.push_back(q);
-    missing += is_gradient ? -1 : 1;
+    if (all[q].kind == QuantityKind::gradient) quantities_.push_back(q);
+    missing += all[q].kind == QuantityKind::gradient ? -1 : 1;
   }
   gradients_are_missing_ = missing > 0;
 }

@@ -18,7 +18,7 @@
 #include "optim/machine/stopwatch.hpp"
 #include "optim/problem/problem.hpp"
 #include "optim/tradeoff/fit_errors.hpp"
-#include "optim/tradeoff/tradeoff_table.hpp"
+#include "optim/tradeoff/tradeoff.hpp"
 
 namespace mbsopt::inline optim {
 

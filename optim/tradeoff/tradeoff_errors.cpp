@@ -32,11 +32,10 @@ TradeoffErrors::TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Ans
   if ((sensor_scale_.array() > 0).any()) add({QuantityKind::sensors, "sensors"}, 1);
   const bool gradients = exact_.psi_rho.size() > 0 && second.psi_rho.size() > 0;
   for (const bool gradient : {false, true}) {
-    Index i = -1;
-    for (const Objective& o : runs.objectives()) {
-      ++i;
-      if (!o.needs_simulation() || (gradient && !gradients)) continue;
+    for (Index i = 0; i < std::ssize(runs.objectives()); ++i) {
+      const Objective& o = runs.objectives()[static_cast<std::size_t>(i)];
       const std::string& name = o.name();
+      if (!o.needs_simulation() || (gradient && !gradients)) continue;
       if (gradient)
         add({QuantityKind::gradient, "gradient of " + name, name, i}, gradient_size(exact_.psi_rho.row(i)));
       else

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <string>
 #include <utility>
@@ -24,6 +23,7 @@ struct Candidate {
   double change = kInfinity;  // made by the last refinement
 
   bool has_settled() const { return change < 1e-9; }
+  double evaluations() const { return static_cast<double>(answer.statistics.rhs_evaluations); }
   // Returns whether a stage came so close to a singular position that its equations were regularised ones.
   bool is_unmet() const { return answer.statistics.max_acceleration_residual > 1e-9; }
 };
@@ -70,7 +70,7 @@ class ReferenceSearch {
     for (const char* integrator : {"dopri853", "gauss6", "verner6", "radau5"}) {
       const bool agree = std::ranges::count_if(found, &Candidate::has_settled) >= 2 && closest(found).apart < kAgreeing;
       if (agree || interrupted()) break;
-      add(refined(tighter_tolerances(integrator)), found);
+      if (std::optional<Candidate> next = refined(tighter_tolerances(integrator))) found.push_back(std::move(*next));
     }
     if (std::ranges::any_of(found, &Candidate::is_unmet)) add_stepped(found);
     reference.interrupted = interrupted();
@@ -103,16 +103,11 @@ class ReferenceSearch {
     return limit;
   }
 
-  static void add(std::optional<Candidate> candidate, std::vector<Candidate>& found) {
-    if (candidate) found.push_back(std::move(*candidate));
-  }
-
   // Refines until the answer no longer settles. Steps that are too large for any answer are left out.
   std::optional<Candidate> refined(const Refinement& series) {
     std::optional<Candidate> best;
     for (const ReferenceMethod& method : series.methods) {
-      const auto evaluations = [&] { return static_cast<double>(best->answer.statistics.rhs_evaluations); };
-      if (best && (best->change < series.settled || series.growth * evaluations() > series.most_evaluations ||
+      if (best && (best->change < series.settled || series.growth * best->evaluations() > series.most_evaluations ||
                    series.growth * best->method.wall_seconds > options_.seconds_per_run))
         break;
       Candidate next{
@@ -140,11 +135,11 @@ class ReferenceSearch {
 
   // If these agree, nothing else counts.
   void add_stepped(std::vector<Candidate>& found) {
-    long most_evaluations = 0;
-    for (const Candidate& c : found) most_evaluations = std::max(most_evaluations, c.answer.statistics.rhs_evaluations);
+    double most_evaluations = 0;
+    for (const Candidate& c : found) most_evaluations = std::max(most_evaluations, c.evaluations());
     for (const char* integrator : kStepped) {
       if (interrupted()) return;
-      add(stepped(integrator, static_cast<double>(most_evaluations)), found);
+      if (std::optional<Candidate> next = stepped(integrator, most_evaluations)) found.push_back(std::move(*next));
     }
     std::vector<Candidate> met = found;
     std::erase_if(met, std::mem_fn(&Candidate::is_unmet));
@@ -220,31 +215,23 @@ class ReferenceSearch {
   // The answer that agrees best with any of the other method's, and its certificate. The certificate is that other
   // answer, or the next best of either method, since the best of many is chance. It is not ok if a method has none.
   GradientPair closest_gradients(const std::vector<Answer>& of_a, const std::vector<Answer>& of_b) const {
-    const Answer *answer = nullptr, *closest = nullptr, *next = nullptr;
-    double least = kInfinity, next_least = kInfinity;
-    for (const Answer& a : of_a) {
-      for (const Answer& b : of_b) {
-        if (!a.ok || !b.ok) continue;
-        const double here = apart(a, b, true);
-        if (!answer || here < least) {
-          answer = &a;
-          closest = &b;
-          least = here;
-        }
-      }
-    }
-    if (!answer) return {};
-    for (const std::vector<Answer>* answers : {&of_a, &of_b}) {
-      for (const Answer& other : *answers) {
-        if (!other.ok || &other == answer || &other == closest) continue;
-        const double here = apart(*answer, other, true);
-        if (here < next_least) {
-          next = &other;
-          next_least = here;
-        }
-      }
-    }
-    return {*answer, next && next_least >= least ? *next : *closest, least};
+    struct Near {
+      const Answer *answer = nullptr, *other = nullptr;
+      double apart = kInfinity;
+    };
+    Near closest, next;
+    const auto take_nearer = [&](Near& best, const Answer& answer, const Answer& other) {
+      if (!answer.ok || !other.ok) return;
+      const double here = apart(answer, other, true);
+      if (!best.answer || here < best.apart) best = {&answer, &other, here};
+    };
+    for (const Answer& a : of_a)
+      for (const Answer& b : of_b) take_nearer(closest, a, b);
+    if (!closest.answer) return {};
+    for (const std::vector<Answer>* answers : {&of_a, &of_b})
+      for (const Answer& other : *answers)
+        if (&other != closest.answer && &other != closest.other) take_nearer(next, *closest.answer, other);
+    return {*closest.answer, next.answer && next.apart >= closest.apart ? *next.other : *closest.other, closest.apart};
   }
 
   // Step-size control sees only the motion. Effects on derivatives alone, such as a kink of a law in a parameter, need

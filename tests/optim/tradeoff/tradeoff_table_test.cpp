@@ -1,4 +1,4 @@
-#include "optim/tradeoff/tradeoff_table.hpp"
+#include "optim/tradeoff/tradeoff.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
