@@ -11,7 +11,6 @@
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/run/command.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/check/gradient_check.hpp"
@@ -20,8 +19,6 @@
 
 namespace mbsopt::inline app {
 namespace {
-
-constexpr std::string_view kFrozen = "fd_frozen";  // the key of differences on frozen steps
 
 struct ComparedMethod {
   const char* key;   // in result.json
@@ -49,33 +46,30 @@ constexpr std::size_t kMostLadders = 60;  // plots of a page that stays below 40
 std::string ladder_id(std::size_t pair) { return fmt::format("ladder-{}", pair); }  // for links
 
 // All derivatives of each objective, and how they compare. A comparison with differences links to their plot.
-void show_entries(RunPage& page, bool discrete) {
-  const Json& result = page.run.result;
+void show_entries(RunPage& page, const GradientCheck& check) {
   std::ostream& out = page.run.context.out;
   page.heading("Verdicts");
-  out << (discrete ? "\nfrozen: differences on the steps of the base run; free: with step-size control at work. "
-                     "Relative to tlm:\n"
-                   : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
-                     "frozen. Relative to tlm:\n");
-  std::size_t pair = 0;
-  for (const auto& [objective, entries] : result.at("verdict").at("entries").items()) {
+  out << (check.discrete ? "\nfrozen: differences on the steps of the base run; free: with step-size control at work. "
+                           "Relative to tlm:\n"
+                         : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
+                           "frozen. Relative to tlm:\n");
+  const auto derivative = [](double value) { return std::isfinite(value) ? number_cell(value, 11) : "failed"; };
+  const auto comparison = [](const std::optional<Verdict>& verdict, double difference) {
+    return compared(verdict ? to_string(*verdict) : "-", difference);
+  };
+  for (const std::string& objective : check.objectives) {
     TextTable table(
         {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
-    for (const auto& [parameter, entry] : entries.items()) {
-      TableRow& row = table.add({parameter});
-      for (const char* method : {"adjoint", "tlm", "fd_frozen", "fd_free"}) {
-        const bool known = result["methods"].contains(method) && (method != kFrozen || !entry.at("frozen").is_null());
-        const Json value = known ? result["methods"][method]["gradient"][objective][parameter] : Json();
-        const bool failed = known && !std::isfinite(value.get<double>());
-        row.push_back(failed ? "failed" : known ? number_cell(value, 11) : "-");
-      }
-      for (const auto& [verdict, difference] :
-           {std::pair{"exact", "tlm_adjoint"}, {"frozen", "frozen_difference"}, {"free", "free_difference"}})
-        row.push_back(compared(cell(entry.at(verdict)), number_of(entry, difference)));
-      if (pair < kMostLadders) row[6].link = row[7].link = "#" + ladder_id(pair);
-      ++pair;
+    for (std::size_t k = 0; k < check.entries.size(); ++k) {
+      const CheckedEntry& e = check.entries[k];
+      if (e.objective != objective) continue;
+      TableRow& row = table.add({e.parameter, derivative(e.adjoint), derivative(e.tlm),
+                                 e.frozen_verdict ? derivative(e.frozen) : "-", derivative(e.free),
+                                 comparison(e.exact, e.tlm_adjoint), comparison(e.frozen_verdict, e.frozen_difference),
+                                 comparison(e.free_verdict, e.free_difference)});
+      if (k < kMostLadders) row[6].link = row[7].link = "#" + ladder_id(k);
     }
-    const std::string value = objective_line(objective, result["objectives"][objective]);
+    const std::string value = objective_line(objective, page.run.result["objectives"][objective]);
     out << '\n' << value << table.text();
     page.paragraph(value);
     page.table(table);
@@ -160,12 +154,7 @@ void add_continuous(Json& result, const GradientCheck& check) {
 }
 
 void add_to_result(Json& result, const GradientCheck& check, const std::vector<std::optional<double>>& true_values) {
-  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
-    const Eigen::Index row = static_cast<Eigen::Index>(i);
-    Json& objective = result["objectives"][check.objectives[i]];
-    objective = objective_json(check.psi(row), true_values[i]);
-    objective["gradient"] = by_name(check.parameters, check.adjoint.row(row));
-  }
+  result["objectives"] = objectives_json(check.objectives, check.psi, true_values, check.parameters, check.adjoint);
   for (const ComparedMethod& method : compared_methods(check))
     result["methods"][method.key] = {{"wall_seconds", method.cost.wall_seconds},
                                      {"simulations_wall_ratio", method.cost.ratio},
@@ -203,104 +192,87 @@ void add_to_result(Json& result, const GradientCheck& check, const std::vector<s
   }
 }
 
-std::vector<double> numbers_of(const Json& array) {
-  std::vector<double> numbers;
-  for (const Json& x : array) numbers.push_back(x.is_number() ? x.get<double>() : NAN);
-  return numbers;
-}
-
 // Adds the series if a logarithmic axis can show any of it.
 void add_positive(LinePlot& plot, PlotSeries series) {
   if (std::ranges::any_of(series.y, [](double y) { return y > 0; })) plot.series.push_back(std::move(series));
 }
 
 // |central difference - tangent-linear model| over the step h, per kind of steps.
-LinePlot ladder_plot(const std::string& objective, const std::string& unit, const Parameter& parameter,
-                     const Json& entry, double derivative) {
+LinePlot ladder_plot(const CheckedEntry& e, const std::string& unit, const Parameter& parameter) {
   const std::string step = parameter.unit.empty() ? kUnknownUnit : parameter.unit;
-  LinePlot plot{.title = fmt::format("d {}/d {}: differences over their step", objective, parameter.name),
-                .x_label = fmt::format("step h of {} [{}]", parameter.name, step),
+  LinePlot plot{.title = fmt::format("d {}/d {}: differences over their step", e.objective, e.parameter),
+                .x_label = fmt::format("step h of {} [{}]", e.parameter, step),
                 .y_label = fmt::format("|difference - derivative| [{}]", unit_per(unit, step)),
                 .logarithmic_y = true,
                 .logarithmic_x = true};
-  for (const auto& [key, name] :
-       {std::pair("frozen", "on frozen steps"), std::pair("free", "with step-size control")}) {
-    std::vector<double> errors = numbers_of(entry.at("ladder").at(key));
-    for (double& y : errors) y = std::abs(y - derivative);
-    add_positive(plot, {name, numbers_of(entry.at("ladder").at("h")), errors});
+  for (const auto& [difference, name] :
+       {std::pair(&LadderRung::frozen, "on frozen steps"), std::pair(&LadderRung::free, "with step-size control")}) {
+    PlotSeries series{name, {}, {}};
+    for (const LadderRung& rung : e.rungs) {
+      series.x.push_back(rung.h);
+      series.y.push_back(std::abs(rung.*difference - e.adjoint));
+    }
+    add_positive(plot, std::move(series));
   }
   return plot;
 }
 
-// The entry of result["verdict"]["entries"] for one objective and one parameter.
-struct CheckedPair {
-  std::string objective, parameter;
-  const Json& entry;
-};
-
-void add_ladders(RunPage& page, const std::vector<CheckedPair>& pairs) {
+void add_ladders(RunPage& page, const std::vector<CheckedEntry>& entries) {
   const Scene& scene = page.run.problem.scene;
   page.heading("Differences over their step");
   page.note("Errors fall as h^2 until rounding, or the integrator's error on free steps, takes over as 1/h.");
   page.begin_choices({"objective", "parameter"});
-  for (std::size_t k = 0; k < std::min(pairs.size(), kMostLadders); ++k) {
-    const auto& [objective, parameter, entry] = pairs[k];
-    const Json& values = page.run.result.at("objectives").at(objective);
-    const double derivative = number_of(values.at("gradient"), parameter);
-    const auto found = std::ranges::find(scene.parameters, parameter, &Parameter::name);
-    if (std::isnan(derivative) || found == scene.parameters.end()) continue;
-    page.begin_choice({objective, parameter}, ladder_id(k));
-    page.plot(ladder_plot(objective, unit_of(values), *found, entry, derivative));
+  for (std::size_t k = 0; k < std::min(entries.size(), kMostLadders); ++k) {
+    const CheckedEntry& e = entries[k];
+    const auto parameter = std::ranges::find(scene.parameters, e.parameter, &Parameter::name);
+    if (!std::isfinite(e.adjoint) || parameter == scene.parameters.end()) continue;
+    page.begin_choice({e.objective, e.parameter}, ladder_id(k));
+    page.plot(ladder_plot(e, unit_of(page.run.result.at("objectives").at(e.objective)), *parameter));
     page.end_choice();
   }
   page.end_choices();
-  if (pairs.size() > kMostLadders)
-    page.note(fmt::format("The first {} of {} plots are drawn.", kMostLadders, pairs.size()));
+  if (entries.size() > kMostLadders)
+    page.note(fmt::format("The first {} of {} plots are drawn.", kMostLadders, entries.size()));
 }
 
-void add_taylor(RunPage& page) {
-  const Json& objectives = page.run.result.at("objectives");
-  const Json taylor = page.run.result.at("verdict").value("taylor", Json::object());
+void add_taylor(RunPage& page, const std::vector<TaylorCheck>& taylor) {
   std::set<std::string> units;
-  for (const auto& [objective, of_one] : taylor.items()) units.insert(unit_of(objectives.at(objective)));
+  for (const TaylorCheck& t : taylor) units.insert(unit_of(page.run.result.at("objectives").at(t.objective)));
   LinePlot plot{.title = "Taylor remainder along a random direction d of all parameters",
                 .x_label = "h [-]",
                 .y_label = fmt::format("|psi(rho + h d) - psi - h psi_rho d| [{}]",
                                        units.size() == 1 ? *units.begin() : kUnknownUnit),
                 .logarithmic_y = true,
                 .logarithmic_x = true};
-  for (const auto& [objective, of_one] : taylor.items()) {
-    const Json slope = of_one.value("slope", Json());
-    add_positive(plot, {slope.is_number() ? fmt::format("{}: h^{:.2f}", objective, slope.get<double>()) : objective,
-                        numbers_of(of_one.at("h")), numbers_of(of_one.at("remainder"))});
+  for (const TaylorCheck& t : taylor) {
+    PlotSeries series{t.slope ? fmt::format("{}: h^{:.2f}", t.objective, *t.slope) : t.objective, {}, {}};
+    for (const TaylorRow& row : t.rows) {
+      series.x.push_back(row.h);
+      series.y.push_back(row.remainder);
+    }
+    add_positive(plot, std::move(series));
   }
   if (plot.series.empty()) return;
   page.heading("Taylor remainder");
   page.plot(plot);
 }
 
-std::string worst(const std::vector<CheckedPair>& pairs, const char* difference) {
-  double largest = 0;
-  for (const CheckedPair& pair : pairs)
-    if (const double found = number_of(pair.entry, difference); std::isfinite(found))
-      largest = std::max(largest, found);
-  return fmt::format("{:.1e}", largest);
-}
-
 // The comparison in a sentence, as tables and as curves.
-void show_comparison(RunPage& page, bool discrete) {
-  const Json& verdict = page.run.result.at("verdict");
-  std::vector<CheckedPair> pairs;
-  for (const auto& [objective, parameters] : verdict.at("entries").items())
-    for (const auto& [parameter, entry] : parameters.items()) pairs.push_back({objective, parameter, entry});
-  page.verdict(
-      fmt::format("{}: tangent-linear model and adjoint differ by at most {}, differences on frozen steps by {}, "
-                  "on free steps by {} of an entry.",
-                  verdict.at("passed").get<bool>() ? "All gradients agree" : "Gradients disagree",
-                  worst(pairs, "tlm_adjoint"), worst(pairs, "frozen_difference"), worst(pairs, "free_difference")));
-  show_entries(page, discrete);
-  add_ladders(page, pairs);
-  add_taylor(page);
+void show_comparison(RunPage& page, const GradientCheck& check) {
+  const auto worst = [&](double CheckedEntry::*difference) {
+    double largest = 0;
+    for (const CheckedEntry& e : check.entries)
+      if (std::isfinite(e.*difference)) largest = std::max(largest, e.*difference);
+    return largest;
+  };
+  page.verdict(fmt::format(
+      "{}: tangent-linear model and adjoint differ by at most {:.1e}, differences on frozen steps by {:.1e}, on free "
+      "steps by {:.1e} of an entry.",
+      check.passed() ? "All gradients agree" : "Gradients disagree", worst(&CheckedEntry::tlm_adjoint),
+      worst(&CheckedEntry::frozen_difference), worst(&CheckedEntry::free_difference)));
+  show_entries(page, check);
+  add_ladders(page, check.entries);
+  add_taylor(page, check.taylor);
 }
 
 }  // namespace
@@ -341,7 +313,7 @@ int check_command(const CommandContext& context) {
   print_simulation(context.out, scene, check.statistics);
   warn_of_stiffness(run, check.statistics, true);
   RunPage page(run);
-  show_comparison(page, check.discrete);
+  show_comparison(page, check);
   print_taylor(context.out, check);
   print_identities(context.out, check);
   print_continuous(context.out, check);

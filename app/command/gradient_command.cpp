@@ -3,15 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "app/report/run_page.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/run/command.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "app/terminal/text_table.hpp"
 #include "core/cvodes/cvodes.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/objective/evaluator.hpp"
@@ -23,22 +20,15 @@
 namespace mbsopt::inline app {
 namespace {
 
-const std::map<std::string, GradientMethod> kMethods{{"auto", GradientMethod::automatic},
-                                                     {"tlm", GradientMethod::tlm},
-                                                     {"adjoint", GradientMethod::adjoint},
-                                                     {"cvodes_forward", GradientMethod::cvodes_forward},
-                                                     {"cvodes_adjoint", GradientMethod::cvodes_adjoint},
-                                                     {"fd", GradientMethod::differences}};
+constexpr GradientMethod kMethods[] = {GradientMethod::automatic,      GradientMethod::tlm,
+                                       GradientMethod::adjoint,        GradientMethod::cvodes_forward,
+                                       GradientMethod::cvodes_adjoint, GradientMethod::differences};
 
 void show_objectives(RunPage& page, const Evaluation& evaluation,
                      const std::vector<std::optional<double>>& true_values) {
   Run& run = page.run;
-  for (std::size_t i = 0; i < run.problem.objectives.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    Json& objective = run.result["objectives"][run.problem.objectives[i].name];
-    objective = objective_json(evaluation.psi(row), true_values[i]);
-    objective["gradient"] = by_name(names_of(run.problem.scene.parameters), evaluation.psi_rho.row(row));
-  }
+  run.result["objectives"] = objectives_json(names_of(run.problem.objectives), evaluation.psi, true_values,
+                                             names_of(run.problem.scene.parameters), evaluation.psi_rho);
   add_units(run.result, objective_units(run.problem));
   for (const auto& [name, objective] : run.result["objectives"].items())
     run.context.out << objective_line(name, objective);
@@ -104,15 +94,12 @@ void add_hessians(Run& run, const Hessians& hessians) {
       objective["hessian"][parameters[p]] = by_name(parameters, H.value.row(static_cast<Eigen::Index>(p)));
     objective["hessian_error"] = H.relative();
     print_hessian(run.context.out, H, name, parameters);
-  }
-  for (std::size_t i = 0; i < hessians.of.size(); ++i) {
-    const ObjectiveHessian& H = hessians.of[i];
     const double size = std::max(H.largest_entry, H.gradient);
     if (H.largest_error <= kPoorlyKnown * size) continue;
     run.warn(
         fmt::format("the second derivatives of '{}' are known to {:.1g} of the largest only: differences at different "
                     "steps do not agree; is it smooth here (abs, min, max)?",
-                    run.problem.objectives[i].name, H.largest_error / size));
+                    name, H.largest_error / size));
   }
 }
 
@@ -138,7 +125,8 @@ int gradient_command(const CommandContext& context) {
   const Scene& scene = run.problem.scene;
   if (run.problem.objectives.empty()) throw std::invalid_argument("objectives: there are none to differentiate");
 
-  GradientMethod wanted = kMethods.at(context.options.method);
+  GradientMethod wanted =
+      *std::ranges::find(kMethods, context.options.method, [](GradientMethod method) { return to_string(method); });
   if (context.options.hessian) {
     require_second_order(scene, wanted);
     if (wanted == GradientMethod::automatic) wanted = GradientMethod::adjoint;

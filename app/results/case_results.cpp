@@ -8,7 +8,6 @@
 #include "app/results/objective_units.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "optim/check/gradient_check.hpp"
-#include "optim/objective/evaluator.hpp"
 #include "optim/problem/load_cases.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
@@ -36,13 +35,9 @@ void add_cases(Run& run, bool gradients, GradientMethod method) {
   const std::vector<std::optional<double>> true_values = evaluator.true_values(rho);
   for (std::size_t c = 0; c < evaluator.cases(); ++c) {
     const Evaluation& e = all.of_cases[c];
-    Json& result = run.result["cases"][evaluator.case_name(c)]["objectives"];
-    for (std::size_t i = 0; i < objectives.size(); ++i) {
-      const Eigen::Index at = static_cast<Eigen::Index>(i);
-      const std::optional<double>& true_value = true_values[c * objectives.size() + i];
-      result[objectives[i]] = objective_json(e.psi(at), true_value);
-      if (gradients && !parameters.empty()) result[objectives[i]]["gradient"] = by_name(parameters, e.psi_rho.row(at));
-    }
+    run.result["cases"][evaluator.case_name(c)]["objectives"] =
+        objectives_json(objectives, e.psi, std::span(true_values).subspan(c * objectives.size(), objectives.size()),
+                        gradients ? parameters : std::vector<std::string>(), e.psi_rho);
   }
   Json shown{{"cases", run.result["cases"]}};
   add_units(shown, objective_units(problem));

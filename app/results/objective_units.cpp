@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "core/expression/dimension_inference.hpp"
 #include "core/scene/scene_facts.hpp"
@@ -45,41 +44,37 @@ class Dimensions {
   SceneFacts facts_;
 };
 
-// The terms of a sum have one dimension: that of the known ones.
-class SumOfTerms {
- public:
-  void add(const Known& term) {
+// The terms of a sum have one dimension: that of the known ones. Beside a term of unknown dimension a number may have
+// any dimension.
+Known dimension_of_sum(const std::vector<Known>& terms) {
+  Known sum;
+  bool has_unknown = false;
+  for (const Known& term : terms) {
     if (!term)
-      unknown_ = true;
-    else if (!sum_ || sum_->is_none())
-      sum_ = term;
-    else if (!term->is_none() && !compatible(*sum_, *term))
-      clash_ = true;
+      has_unknown = true;
+    else if (!sum || sum->is_none())
+      sum = term;
+    else if (!term->is_none() && !compatible(*sum, *term))
+      return std::nullopt;
   }
-  // Beside a term of unknown dimension a number may have any dimension.
-  Known dimension() const { return clash_ || (unknown_ && sum_ && sum_->is_none()) ? std::nullopt : sum_; }
-
- private:
-  Known sum_;
-  bool unknown_ = false, clash_ = false;
-};
+  return has_unknown && sum && sum->is_none() ? std::nullopt : sum;
+}
 
 Known product(const Known& a, const Known& b) { return a && b ? Known(*a * *b) : std::nullopt; }
 
 Known dimension_of(const ObjectiveSpec& spec, const Dimensions& dimensions) {
-  SumOfTerms sum;
   for (const std::optional<Expression>& mean : spec.means)
     if (mean) return dimensions.of(*mean);
-  if (spec.running) sum.add(product(dimensions.of(*spec.running), dimension::kTime));
+  std::vector<Known> terms;
+  if (spec.running) terms.push_back(product(dimensions.of(*spec.running), dimension::kTime));
   for (const std::optional<Expression>* term : {&spec.terminal, &spec.parameters_only})
-    if (*term) sum.add(dimensions.of(**term));
-  for (const ObjectiveSample& sample : spec.samples) sum.add(dimensions.of(sample.value));
+    if (*term) terms.push_back(dimensions.of(**term));
+  for (const ObjectiveSample& sample : spec.samples) terms.push_back(dimensions.of(sample.value));
   for (const TrackTerm& term : spec.track) {
     const Known sensor = dimensions.of_name(term.sensor);
-    const Known weight = dimensions.of(term.weight);
-    sum.add(product(weight, product(sensor, sensor)));
+    terms.push_back(product(dimensions.of(term.weight), product(sensor, sensor)));
   }
-  return sum.dimension();
+  return dimension_of_sum(terms);
 }
 
 std::string unit_of(const ObjectiveSpec& spec, const Dimensions& dimensions) {
@@ -112,6 +107,18 @@ std::string shown_unit(const ObjectiveUnits& units, const std::string& objective
 Json objective_json(double value, const std::optional<double>& true_value) {
   Json json{{"value", value}};
   if (true_value) json["true_value"] = *true_value;
+  return json;
+}
+
+Json objectives_json(const std::vector<std::string>& names, const Eigen::VectorXd& psi,
+                     std::span<const std::optional<double>> true_values, const std::vector<std::string>& parameters,
+                     const Eigen::MatrixXd& psi_rho) {
+  Json json = Json::object();
+  for (Eigen::Index i = 0; i < psi.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    json[names[k]] = objective_json(psi(i), true_values[k]);
+    if (!parameters.empty()) json[names[k]]["gradient"] = by_name(parameters, psi_rho.row(i));
+  }
   return json;
 }
 

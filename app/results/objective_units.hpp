@@ -6,6 +6,7 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,10 @@ ObjectiveUnits objective_units(const Problem& problem);
 std::string shown_unit(const ObjectiveUnits& units, const std::string& objective);
 
 Json objective_json(double value, const std::optional<double>& true_value);
+// Those of all objectives by name; their gradients if there are parameters.
+Json objectives_json(const std::vector<std::string>& names, const Eigen::VectorXd& psi,
+                     std::span<const std::optional<double>> true_values,
+                     const std::vector<std::string>& parameters = {}, const Eigen::MatrixXd& psi_rho = {});
 
 // An entry of result["objectives"] or result["parameters"]: its unit, or kUnknownUnit.
 std::string unit_of(const Json& quantity);
