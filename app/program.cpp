@@ -7,7 +7,6 @@
 #include <memory>
 
 #include "app/command/command_line.hpp"
-#include "app/starts/rank_server.hpp"
 #include "app/starts/ranks.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/standard_streams.hpp"

@@ -67,6 +67,8 @@ Json to_json(const SimulationStatistics& statistics) {
   return json;
 }
 
+Json to_json(const IntegratorSettings& s) { return {{"type", s.type}, {"rtol", s.rtol}, {"atol", s.atol}}; }
+
 Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
 double number_of(const Json& object, const std::string& key) {

@@ -12,6 +12,7 @@ namespace mbsopt::inline app {
 
 Json to_json(const ModelSummary& summary);
 Json to_json(const SimulationStatistics& statistics);
+Json to_json(const IntegratorSettings& settings);  // type, rtol, atol
 
 Json or_null(const std::optional<double>& value);
 double number_of(const Json& object, const std::string& key);  // NaN if it is none

@@ -24,14 +24,11 @@ std::string in_words(const AccuracyChoice& choice) {
 }
 
 Json to_json(const AccuracyChoice& choice, const std::string& words) {
-  const auto integrator = [](const IntegratorSettings& s) {
-    return Json{{"type", s.type}, {"rtol", s.rtol}, {"atol", s.atol}};
-  };
   Json json{{"in_words", words},
             {"wanted", choice.wanted},
             {"reached", choice.reached},
-            {"integrator", integrator(choice.settings.integrator)},
-            {"verified_by", integrator(choice.verified_by)},
+            {"integrator", to_json(choice.settings.integrator)},
+            {"verified_by", to_json(choice.verified_by)},
             {"estimated_error", choice.largest_error()},
             {"rounding", AccuracyChoice::kRounding}};
   for (const ErrorEstimate& e : choice.estimates)

@@ -35,44 +35,27 @@ constexpr int kTag = 1;
 //   RTLD_DEEPBIND   Open MPI finds its own symbols first, not the substitute's;
 //   RTLD_GLOBAL     its plugins find it, after all that the program was linked with.
 class OpenMpi {
- public:
-  OpenMpi() : library_(::dlopen(kLibrary, RTLD_NOW | RTLD_GLOBAL | RTLD_DEEPBIND)) {
+  void* library_ = ::dlopen(kLibrary, RTLD_NOW | RTLD_GLOBAL | RTLD_DEEPBIND);  // stays loaded until the process ends
+
+  template <class Symbol>
+  Symbol found(const char* name) const {
     if (!library_) throw std::runtime_error(fmt::format("Open MPI cannot be loaded: {}", ::dlerror()));
-    find(init, "MPI_Init");
-    find(finalize, "MPI_Finalize");
-    find(comm_rank, "MPI_Comm_rank");
-    find(comm_size, "MPI_Comm_size");
-    find(send, "MPI_Send");
-    find(recv, "MPI_Recv");
-    find(iprobe, "MPI_Iprobe");
-    find(get_count, "MPI_Get_count");
-    world = static_cast<MPI_Comm>(symbol("ompi_mpi_comm_world"));
-    character = static_cast<MPI_Datatype>(symbol("ompi_mpi_char"));
+    void* const symbol = ::dlsym(library_, name);
+    if (!symbol) throw std::runtime_error(fmt::format("{} has no {}", kLibrary, name));
+    return reinterpret_cast<Symbol>(symbol);
   }
 
-  decltype(&MPI_Init) init;
-  decltype(&MPI_Finalize) finalize;
-  decltype(&MPI_Comm_rank) comm_rank;
-  decltype(&MPI_Comm_size) comm_size;
-  decltype(&MPI_Send) send;
-  decltype(&MPI_Recv) recv;
-  decltype(&MPI_Iprobe) iprobe;
-  decltype(&MPI_Get_count) get_count;
-  MPI_Comm world;
-  MPI_Datatype character;
-
- private:
-  void* symbol(const char* name) const {
-    void* const found = ::dlsym(library_, name);
-    if (!found) throw std::runtime_error(fmt::format("{} has no {}", kLibrary, name));
-    return found;
-  }
-  template <class Function>
-  void find(Function& function, const char* name) const {
-    function = reinterpret_cast<Function>(symbol(name));
-  }
-
-  void* library_;  // stays loaded until the process ends
+ public:
+  decltype(&MPI_Init) init = found<decltype(&MPI_Init)>("MPI_Init");
+  decltype(&MPI_Finalize) finalize = found<decltype(&MPI_Finalize)>("MPI_Finalize");
+  decltype(&MPI_Comm_rank) comm_rank = found<decltype(&MPI_Comm_rank)>("MPI_Comm_rank");
+  decltype(&MPI_Comm_size) comm_size = found<decltype(&MPI_Comm_size)>("MPI_Comm_size");
+  decltype(&MPI_Send) send = found<decltype(&MPI_Send)>("MPI_Send");
+  decltype(&MPI_Recv) recv = found<decltype(&MPI_Recv)>("MPI_Recv");
+  decltype(&MPI_Iprobe) iprobe = found<decltype(&MPI_Iprobe)>("MPI_Iprobe");
+  decltype(&MPI_Get_count) get_count = found<decltype(&MPI_Get_count)>("MPI_Get_count");
+  MPI_Comm world = found<MPI_Comm>("ompi_mpi_comm_world");
+  MPI_Datatype character = found<MPI_Datatype>("ompi_mpi_char");
 };
 
 class MpiRanks : public Ranks {

@@ -9,7 +9,6 @@
 #include "app/report/run_page.hpp"
 #include "app/starts/distinct_optima.hpp"
 #include "app/terminal/interrupt.hpp"
-#include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt::inline app {

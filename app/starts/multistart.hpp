@@ -8,7 +8,6 @@
 // decides ties.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -1,5 +1,4 @@
-#include "app/starts/rank_server.hpp"
-
+// What the ranks of mpirun other than 0 do.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -14,6 +13,7 @@
 #include "app/run/provenance.hpp"
 #include "app/starts/design_starts.hpp"
 #include "app/starts/identify_starts.hpp"
+#include "app/starts/ranks.hpp"
 #include "app/starts/sweep_blocks.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"

@@ -10,6 +10,8 @@
 #include <optional>
 #include <string>
 
+#include "optim/problem/named_terms.hpp"
+
 namespace mbsopt::inline app {
 
 // The interval between checks for messages. MPI itself would wait at full speed.
@@ -33,5 +35,10 @@ struct Ranks {
 // process. Returns null, without MPI, if it did not, or if it started one process only. Throws std::runtime_error if
 // this build has no MPI, or finds no library.
 std::unique_ptr<Ranks> mpi_ranks();
+
+// A rank other than 0 computes starts until rank 0 dismisses all (rank_server.cpp). terms are those of the program.
+// Returns the exit code.
+int serve(Ranks& ranks, const NamedTerms& terms = {});
+void dismiss(Ranks& ranks);
 
 }  // namespace mbsopt::inline app

@@ -20,12 +20,6 @@ namespace {
 // mpirun kills a second after its request to end. All results must be written before.
 constexpr std::chrono::milliseconds kPatience{300};
 
-// Rank 0 may have chosen the integrator (accuracy_results.hpp).
-Json integrator_of(const Problem& problem) {
-  const IntegratorSettings& s = problem.scene.simulation.integrator;
-  return {{"type", s.type}, {"rtol", s.rtol}, {"atol", s.atol}};
-}
-
 Json work_message(const Run& run, const Json& task, int workers) {
   const CommandContext& context = run.context;
   return {{"work",
@@ -36,7 +30,7 @@ Json work_message(const Run& run, const Json& task, int workers) {
             {"input_sha256", run.result["provenance"]["input_sha256"]},
             {"data_sha256", run.result["provenance"].value("data_sha256", Json())},
             {"workers", workers},
-            {"integrator", integrator_of(run.problem)},
+            {"integrator", to_json(run.problem.scene.simulation.integrator)},  // which rank 0 may have chosen
             {"task", task}}}};
 }
 
