@@ -5,13 +5,11 @@
 #include <cmath>
 #include <utility>
 
-#include "app/report/motion_plots.hpp"
 #include "app/report/run_page.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/simulated_motion.hpp"
-#include "app/run/command.hpp"
 #include "app/starts/design_starts.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
@@ -26,18 +24,13 @@ void add_to_result(Json& result, const DesignResult& design) {
   result["simulation"] = to_json(design.final_evaluation.statistics);
   result["objectives"][design.objective] = objective_json(design.objective_final, design.objective_true);
   result["objectives"][design.objective]["initial"] = design.objective_initial;
-  for (const DesignCase& c : design.cases) {
-    Json& objective = result["cases"][c.name]["objectives"][design.objective];
+  const auto add = [](Json& objective, const DesignCase& c) {
     objective = objective_json(c.value, c.true_value);
     objective["initial"] = c.initial;
     objective["weight"] = c.weight;
-  }
-  for (const DesignCase& term : design.terms) {
-    Json& objective = result["objectives"][term.name];
-    objective = objective_json(term.value, term.true_value);
-    objective["initial"] = term.initial;
-    objective["weight"] = term.weight;
-  }
+  };
+  for (const DesignCase& c : design.cases) add(result["cases"][c.name]["objectives"][design.objective], c);
+  for (const DesignCase& term : design.terms) add(result["objectives"][term.name], term);
   for (const DesignConstraint& c : design.constraints) {
     Json& objectives = c.load_case.empty() ? result["objectives"] : result["cases"][c.load_case]["objectives"];
     Json& objective = objectives[c.objective];
@@ -73,12 +66,8 @@ void add_to_result(Json& result, const DesignResult& design) {
                {"optimality", design.optimality},
                {"infeasibility", design.violation},
                {"true_infeasibility", design.true_violation}};
-  if (design.maximises) optimizer["maximised"] = true;
   if (design.seed) optimizer["seed"] = *design.seed;
-  if (design.status == SolverStatus::converged)
-    optimizer["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
-  if (design.mode && design.mode->of > 0) optimizer["assembly_mode"] = mode_json(*design.mode);
-  if (design.closing_steps > 0) optimizer["closing_steps"] = design.closing_steps;
+  add_kind_of_end(optimizer, design);
   optimizer["decisions"] = design.decisions;
   for (const DesignConflict& c : design.conflicts)
     result["conflicts"].push_back({{"limit", c.limit}, {"missed", c.missed}, {"price", c.price}});
@@ -229,8 +218,7 @@ void add_motions(RunPage& page, const Scene& designed, const SimulatedMotion& be
                       {"after", designed, after.trajectory, false, targets, after.forces}});
   else
     add_motion(page, {{"before", scene, before.trajectory, false, targets, before.forces}});
-  for (const LinePlot& plot : motion_plots(scene, before.trajectory, after.trajectory, sensor_limits(page.run.problem)))
-    page.plot(plot);
+  add_compared_motions(page, scene, before.trajectory, after.trajectory, sensor_limits(page.run.problem));
 }
 
 // If the linkage does not close at the values of the file, the design starts from values at which it does.
@@ -267,8 +255,7 @@ int design_command(const CommandContext& context) {
   if (!before.simulation.ok() && !interrupted()) lead_to_closing(run, before);
   if (!before.simulation.ok()) {
     run.broke_off("nothing was designed yet", before.simulation.message, before.simulation.last_good_time);
-    add_simulated_motion(page, scene, before.trajectory,
-                         {.targets = prescribed_points(run.problem, before.instants), .forces = before.forces});
+    add_simulated_motion(page, scene, before, prescribed_points(run.problem, before.instants));
     page.write();
     return run.finish();
   }
@@ -302,11 +289,7 @@ int design_command(const CommandContext& context) {
   } else if (!design.ok()) {
     long_run.failed(design.status, design.message);
   }
-  for (std::size_t i = 0; i < after.instants.size(); ++i) {
-    const std::string& name = run.problem.objectives[i].name;
-    if (!after.instants[i].empty() && run.result["objectives"].contains(name))
-      run.result["objectives"][name]["instants"] = after.instants[i];
-  }
+  add_instants(run, after);
   const Trajectory history = history_of(design);
   std::vector<NewValue> values;
   for (const DesignVariable& v : design.variables) values.push_back({"", v.name, v.value});

@@ -9,8 +9,8 @@
 #include "app/results/case_results.hpp"
 #include "app/results/channel_data.hpp"
 #include "app/results/identification_results.hpp"
-#include "app/results/joint_forces.hpp"
 #include "app/results/optimized_problem.hpp"
+#include "app/results/recorded_motion.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
 #include "app/starts/identify_starts.hpp"
@@ -135,27 +135,19 @@ Scene simulated_scene(const Problem& problem, const std::vector<CsvTable>& data)
       .simulated();
 }
 
-struct SimulatedExperiment {
+struct SimulatedExperiment : RecordedMotion {
   Scene scene;
-  Trajectory trajectory;
   SimulationResult simulation;
-  Trajectory forces = {};  // of joints
 };
 
 SimulatedExperiment simulated_experiment(Run& run, Scene scene) {
-  SimulatedExperiment motion{std::move(scene), {}, {}};
+  SimulatedExperiment motion{{}, std::move(scene), {}};
   const Mechanism mechanism(motion.scene, parameter_values(motion.scene),
                             std::vector<bool>(motion.scene.parameters.size(), false));
   RunOptions options;
   options.progress = fit_progress(run);
-  Sampling sampling = record_trajectory(mechanism, motion.scene, motion.trajectory);
-  JointForces forces(motion.scene, parameter_values(motion.scene), sampling.times.size());
-  sampling.observe = [&, record = sampling.observe](std::size_t i, const StatePoint& at) {
-    record(i, at);
-    forces.observe(i, at);
-  };
+  const Sampling sampling = record_motion(mechanism, motion.scene, motion);
   motion.simulation = simulate(mechanism, motion.scene.simulation, {}, sampling, options);
-  motion.forces = forces.table();
   return motion;
 }
 

@@ -6,13 +6,10 @@
 #include <stdexcept>
 
 #include "app/report/run_page.hpp"
-#include "app/results/joint_forces.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/simulated_motion.hpp"
-#include "app/run/command.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/driven/kinematics.hpp"
-#include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/kinematic_scene.hpp"
 
 namespace mbsopt::inline app {
@@ -27,49 +24,26 @@ Scene prescribed(const Scene& scene) {
   throw std::invalid_argument(all);
 }
 
-// The effort of each drive over time along its coordinate; it is positive if it increases the coordinate.
-struct DriveEfforts {
-  std::vector<int> rows;
-  Trajectory table;
-
-  DriveEfforts(const MechanismData& d) {
-    table.columns = {"t"};
-    for (const RowLaw& law : d.laws) {
-      if (law.drive < 0) continue;
-      rows.push_back(law.row);
-      table.columns.push_back(d.drive_names[static_cast<std::size_t>(law.drive)]);
-    }
-  }
-  void record(const StatePoint& at) {
-    std::vector<double>& row = table.rows.emplace_back(std::vector<double>{at.t});
-    const Motion& motion = at.motion->motion(at);
-    for (const int r : rows) row.push_back(-motion.lambda(r));
-  }
-};
-
 // The rows up to the first one with an effort that is no number, unless it has no limit at a singular position.
-std::size_t finite_rows(const DriveEfforts& efforts, const std::vector<SingularPosition>& singular) {
+std::size_t finite_rows(const Trajectory& efforts, const std::vector<SingularPosition>& singular) {
   const auto is_finite = [&](const std::vector<double>& row) {
     const bool nan_has_cause =
         std::ranges::any_of(singular, [&](const SingularPosition& s) { return std::abs(row[0] - s.t) < s.half; });
     return std::ranges::all_of(row, [&](double x) { return std::isfinite(x) || (std::isnan(x) && nan_has_cause); });
   };
-  const std::vector<std::vector<double>>& rows = efforts.table.rows;
-  return static_cast<std::size_t>(std::ranges::find_if_not(rows, is_finite) - rows.begin());
+  return static_cast<std::size_t>(std::ranges::find_if_not(efforts.rows, is_finite) - efforts.rows.begin());
 }
 
-void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
-  for (std::size_t k = 1; k < efforts.table.columns.size(); ++k) {
+void add_drives(Run& run, const Scene& scene, const Trajectory& efforts) {
+  for (std::size_t k = 0; k < scene.drives.size(); ++k) {
     double least = INFINITY, largest = -INFINITY;
-    for (const std::vector<double>& row : efforts.table.rows) {
-      least = std::min(least, row[k]);
-      largest = std::max(largest, row[k]);
+    for (const std::vector<double>& row : efforts.rows) {
+      least = std::min(least, row[1 + k]);
+      largest = std::max(largest, row[1 + k]);
     }
     if (largest < least) continue;  // no number at all
-    const std::string& name = efforts.table.columns[k];
-    const auto drive = std::ranges::find(scene.drives, name, &Drive::name);
-    const std::string unit = drive == scene.drives.end() ? "N or N m" : unit_of_effort(*drive);
-    run.result["drives"][name] = {{"force_min", least}, {"force_max", largest}, {"unit", unit}};
+    run.result["drives"][scene.drives[k].name] = {
+        {"force_min", least}, {"force_max", largest}, {"unit", unit_of_effort(scene.drives[k])}};
   }
   if (run.result.contains("drives"))
     run.context.out << "\nforce or torque of each drive along its coordinate\n"
@@ -89,36 +63,28 @@ int kinematics_command(const CommandContext& context) {
   const Assembly assembly(mechanism, scene.simulation.start_time);
   if (!assembled(run, mechanism, assembly, false)) return run.finish();
 
-  Trajectory trajectory;
-  const Sampling sampling = record_trajectory(mechanism, scene, trajectory);
-  DriveEfforts efforts(mechanism.data());
-  JointForces forces(scene, parameter_values(scene), sampling.times.size());
+  RecordedMotion motion;
+  const Sampling sampling = record_motion(mechanism, scene, motion, true);
   const SimulationSettings& settings = scene.simulation;
-  SimulationResult kinematics = solve_kinematics(
-      mechanism, assembly, settings, sampling.times,
-      [&](std::size_t i, const StatePoint& at) {
-        sampling.observe(i, at);
-        forces.observe(i, at);
-        efforts.record(at);
-      },
-      run.watched("kinematics"));
+  SimulationResult kinematics =
+      solve_kinematics(mechanism, assembly, settings, sampling.times, sampling.observe, run.watched("kinematics"));
   run.progress.finish();
   SimulationStatistics& statistics = kinematics.statistics;
-  const std::size_t finite = finite_rows(efforts, statistics.singular);
-  const bool are_finite = finite == efforts.table.rows.size();
-  const double last_good_time = are_finite ? kinematics.last_good_time : efforts.table.rows[finite].front();
-  efforts.table.rows.resize(finite);
+  const std::size_t finite = finite_rows(motion.efforts, statistics.singular);
+  const bool are_finite = finite == motion.efforts.rows.size();
+  const double last_good_time = are_finite ? kinematics.last_good_time : motion.efforts.rows[finite].front();
+  motion.efforts.rows.resize(finite);
   statistics.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   run.result["simulation"] = to_json(statistics);
   context.out << fmt::format(
       "{:.6g} s to {:.6g} s in {} positions by {} steps; largest violation {:.1e} (positions), "
       "{:.1e} (velocities)\n",
-      settings.start_time, last_good_time, trajectory.rows.size(), statistics.steps, statistics.max_position_violation,
-      statistics.max_velocity_violation);
+      settings.start_time, last_good_time, motion.trajectory.rows.size(), statistics.steps,
+      statistics.max_position_violation, statistics.max_velocity_violation);
   const bool motion_ends_early = interrupted();
-  write_trajectory(run, trajectory, statistics.singular);
-  if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
-  add_drives(run, scene, efforts);
+  write_trajectory(run, motion.trajectory, statistics.singular);
+  if (!scene.drives.empty()) run.write("drives.csv", to_csv(motion.efforts));
+  add_drives(run, scene, motion.efforts);
   if (const std::string words = in_words(statistics.singular, {}); !words.empty()) run.warn(words);
   std::vector<PlotInstant> singular;
   for (const SingularPosition& s : statistics.singular) singular.push_back({"singular", s.t});
@@ -133,11 +99,7 @@ int kinematics_command(const CommandContext& context) {
     run.failed(kinematics.message, last_good_time);
   }
   RunPage page(run);
-  add_simulated_motion(page, scene, trajectory,
-                       {.targets = prescribed_points(run.problem),
-                        .forces = forces.table(),
-                        .efforts = efforts.table,
-                        .instants = singular});
+  add_simulated_motion(page, scene, motion, prescribed_points(run.problem), singular);
   page.write();
   return run.finish();
 }

@@ -6,17 +6,12 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "app/report/mechanism_drawing.hpp"
 #include "app/report/run_page.hpp"
 #include "app/results/objective_units.hpp"
-#include "app/results/trajectory_csv.hpp"
-#include "app/run/command.hpp"
-#include "app/terminal/interrupt.hpp"
 #include "core/body/euler_parameters.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
-#include "core/simulate/simulation.hpp"
 #include "core/start/linearisation.hpp"
 
 namespace mbsopt::inline app {
@@ -196,7 +191,7 @@ void add_shapes(RunPage& page, const Mechanism& mechanism, const State& state, c
     if (x.eigenvalues(k).imag() < 0 || ++modes > kDrawn) continue;
     const std::vector<double> shape = displaced_row(mechanism, state, x, k);
     const std::string title = fmt::format("Mode {}, {} Hz", modes, significant(frequency(x.eigenvalues(k)), 4));
-    const std::array<int, 2> plane = plane_of_motion(scene, {trajectory_columns(scene), {rest, shape}}).axes;
+    const std::array<int, 2> plane = plane_of_motion(scene, {{}, {rest, shape}}).axes;
     page.drawing(mechanism_drawing(title, plane, {{"state", scene, rest}, {"displaced", scene, shape}}));
   }
   if (modes > kDrawn) page.paragraph(fmt::format("The first {} of {} modes are drawn.", kDrawn, modes));
@@ -210,13 +205,11 @@ std::string per(const std::string& output, const std::string& input) {
 }
 
 // The amplitude of each output for an input of amplitude 1, from a tenth of the slowest to ten times the fastest mode.
-void add_responses(RunPage& page, const Linearisation& x) {
+void add_responses(RunPage& page, const Linearisation& x, const std::vector<int>& inputs,
+                   const std::vector<int>& outputs) {
   constexpr int kFrequencies = 400;
   constexpr std::size_t kDrawn = 12;
   const Scene& scene = page.run.problem.scene;
-  const Json& result = page.run.result.at("linearisation");
-  const auto inputs = result.at("inputs").get<std::vector<std::string>>(),
-             outputs = result.at("outputs").get<std::vector<std::string>>();
   if (inputs.empty() || outputs.empty()) return;
   double slowest = INFINITY, fastest = 0;
   for (const std::complex<double>& e : x.eigenvalues)
@@ -235,20 +228,20 @@ void add_responses(RunPage& page, const Linearisation& x) {
   std::vector<TableRow> rows;
   std::vector<LinePlot> plots;
   for (std::size_t j = 0; j < inputs.size(); ++j) {
-    const auto parameter = std::ranges::find(scene.parameters, inputs[j], &Parameter::name);
+    const Parameter& input = scene.parameters[static_cast<std::size_t>(inputs[j])];
     for (std::size_t i = 0; i < outputs.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
-      const auto sensor = std::ranges::find(scene.sensors, outputs[i], &Sensor::name);
-      const std::string unit = per(unit_in(scene, *sensor), parameter->unit);
+      const Sensor& output = scene.sensors[static_cast<std::size_t>(outputs[i])];
+      const std::string unit = per(unit_in(scene, output), input.unit);
       const double gain = still(row, column).real();
-      rows.push_back({inputs[j], outputs[i], std::isfinite(gain) ? number_cell(gain, 6) : TableCell("-"), unit});
+      rows.push_back({input.name, output.name, std::isfinite(gain) ? number_cell(gain, 6) : TableCell("-"), unit});
       std::vector<double> amplitudes;
       for (const Eigen::MatrixXcd& G : swinging) amplitudes.push_back(std::abs(G(row, column)));
       if (rows.size() <= kDrawn && std::ranges::any_of(amplitudes, [](double y) { return y > 0; }))
-        plots.push_back({.title = fmt::format("{} by {}", outputs[i], inputs[j]),
+        plots.push_back({.title = fmt::format("{} by {}", output.name, input.name),
                          .x_label = "frequency [Hz]",
                          .y_label = fmt::format("amplitude [{}]", unit),
-                         .series = {{outputs[i], frequencies, amplitudes}},
+                         .series = {{output.name, frequencies, amplitudes}},
                          .logarithmic_y = true,
                          .logarithmic_x = true});
     }
@@ -291,7 +284,7 @@ int linearise_command(const CommandContext& context) {
   show_modes(page, run.result["linearisation"]["modes"]);
   warn_of(run, x, *state);
   add_shapes(page, mechanism, *state, x);
-  add_responses(page, x);
+  add_responses(page, x, inputs, outputs);
   page.write();
   return run.finish();
 }

@@ -5,21 +5,15 @@
 #include "app/results/case_results.hpp"
 #include "app/results/objective_units.hpp"
 #include "app/results/simulated_motion.hpp"
-#include "app/run/command.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 
 namespace mbsopt::inline app {
 namespace {
 
 void add_objectives(Run& run, const SimulatedMotion& motion) {
-  const Eigen::VectorXd& psi = motion.psi;
-  if (psi.size() == 0) return;
-  for (Eigen::Index i = 0; i < psi.size(); ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    Json& objective = run.result["objectives"][run.problem.objectives[k].name];
-    objective = objective_json(psi(i), motion.true_values[k]);
-    if (!motion.instants[k].empty()) objective["instants"] = motion.instants[k];
-  }
+  if (motion.psi.size() == 0) return;
+  run.result["objectives"] = objectives_json(names_of(run.problem.objectives), motion.psi, motion.true_values);
+  add_instants(run, motion);
   add_units(run.result, objective_units(run.problem));
   run.context.out << '\n' << objective_table(run.result).text();
 }
@@ -56,8 +50,7 @@ int simulate_command(const CommandContext& context) {
     run.failed(simulation.message, simulation.last_good_time);
   }
   RunPage page(run);
-  add_simulated_motion(page, scene, motion.trajectory,
-                       {.targets = prescribed_points(run.problem, motion.instants), .forces = motion.forces});
+  add_simulated_motion(page, scene, motion, prescribed_points(run.problem, motion.instants));
   page.write();
   return run.finish();
 }

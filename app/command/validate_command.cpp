@@ -3,7 +3,6 @@
 #include <fmt/ranges.h>
 
 #include "app/results/channel_data.hpp"
-#include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
 #include "app/terminal/interrupt.hpp"

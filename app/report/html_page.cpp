@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "app/report/html_text.hpp"
@@ -18,6 +19,23 @@ constexpr std::size_t kWords = 32;
 constexpr std::size_t kUpright = 2;  // letters of a name that stands upright above a narrow column
 
 constexpr std::size_t kFewColumns = 8;  // they fit a printed page of 18 cm without breaks within words
+
+// Escaped text, in which no line ends within "1e-9" or "--out".
+std::string html_words(std::string_view text) {
+  std::string words;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = text[begin] == ' ' ? begin + 1 : std::min(text.find(' ', begin), text.size());
+    const std::string_view word = text.substr(begin, end - begin);
+    const std::size_t exponent = word.find("e-");
+    const bool number = exponent != std::string_view::npos && exponent > 0 &&
+                        std::isdigit(static_cast<unsigned char>(word[exponent - 1]));
+    const std::string escaped = html_escaped(word);
+    words +=
+        number || (word.starts_with('-') && word.size() > 1) ? "<span class=\"whole\">" + escaped + "</span>" : escaped;
+    begin = end;
+  }
+  return words;
+}
 
 // Writes words as the value of an attribute.
 std::string list_of(const std::vector<std::string>& words) { return html_escaped(json_text(Json(words))); }

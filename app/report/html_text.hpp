@@ -1,12 +1,20 @@
 // Text in HTML.
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 
 namespace mbsopt::inline app {
 
-std::string html_escaped(std::string_view text);
-std::string html_words(std::string_view text);  // escaped; no line ends within "1e-9" or "--out"
+inline std::string html_escaped(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    const std::size_t special = std::string_view("&<>\"").find(c);
+    escaped +=
+        special == std::string_view::npos ? std::string(1, c) : std::array{"&amp;", "&lt;", "&gt;", "&quot;"}[special];
+  }
+  return escaped;
+}
 
 }  // namespace mbsopt::inline app

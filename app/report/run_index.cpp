@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "app/files/atomic_file.hpp"
-#include "app/report/html_page.hpp"
 #include "app/report/run_page.hpp"
 #include "optim/problem/regular_file.hpp"
 

@@ -3,12 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
 
-#include "app/report/line_plot.hpp"
-#include "app/report/mechanism_drawing.hpp"
+#include "app/report/row_plot.hpp"
 #include "app/results/objective_units.hpp"
 #include "core/expression/counted.hpp"
 #include "core/expression/dimension.hpp"
@@ -49,17 +46,33 @@ void add_provenance(HtmlPage& page, const Json& result) {
   page.table({"", ""}, rows);
 }
 
-}  // namespace
-
-double Between::operator()(double value) const {
-  return logarithmic ? std::log(value / lower) / std::log(upper / lower) : (value - lower) / (upper - lower);
+// p dpsi/dp, the change of psi per relative change of p, largest first. A p of zero would hide the derivative.
+void add_tornado(HtmlPage& page, const Scene& scene, const std::string& name, const Json& objective) {
+  constexpr std::size_t kMost = 15;  // rows of one plot
+  RowPlot plot{.title = name + ": what a change of each parameter does",
+               .x_label = fmt::format("p dpsi/dp [{}]", unit_of(objective))};
+  for (const Parameter& p : scene.parameters) {
+    const double effect = p.value * number_of(objective.at("gradient"), p.name);
+    if (std::isfinite(effect) && effect != 0)
+      plot.rows.push_back({.name = p.name, .low = 0, .high = effect, .words = cell(effect, 4)});
+  }
+  const auto larger = [](const PlotRow& a, const PlotRow& b) { return std::abs(a.high) > std::abs(b.high); };
+  std::stable_sort(plot.rows.begin(), plot.rows.end(), larger);
+  const std::size_t all = plot.rows.size();
+  if (all > kMost) plot.rows.resize(kMost);
+  page.drawing(to_svg(plot));
+  if (all > kMost) page.note(fmt::format("The {} largest of {} are drawn.", kMost, all));
 }
 
-std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p) {
+}  // namespace
+
+std::function<double(double value)> place_between_bounds(const Scene& scene, const std::string& name, const Json& p) {
   const double lower = number_of(p, "lower"), upper = number_of(p, "upper");
-  if (!(upper > lower) || !std::isfinite(upper - lower)) return std::nullopt;
+  if (!(upper > lower) || !std::isfinite(upper - lower)) return {};
   const auto parameter = std::ranges::find(scene.parameters, name.substr(name.rfind('.') + 1), &Parameter::name);
-  return Between{lower, upper, parameter != scene.parameters.end() && parameter->scale != ParameterScale::linear};
+  if (parameter != scene.parameters.end() && parameter->scale != ParameterScale::linear)
+    return [=](double value) { return std::log(value / lower) / std::log(upper / lower); };
+  return [=](double value) { return (value - lower) / (upper - lower); };
 }
 
 std::vector<std::string> objective_values(const Json& objectives) {
@@ -144,6 +157,34 @@ void add_objectives(RunPage& page) {
   page.table(objective_table(result));
 }
 
+TextTable gradient_table(const Run& run) {
+  const Json& objectives = run.result.at("objectives");
+  std::vector<std::string> header{"parameter", "value", "unit"};
+  for (const auto& [name, objective] : objectives.items())
+    header.push_back(fmt::format("d {} [{} per unit]", name, unit_of(objective)));
+  TextTable table(header);
+  for (const Parameter& p : run.problem.scene.parameters) {
+    TableRow& row = table.add({p.name, number_cell(p.value, 7), p.unit.empty() ? "-" : p.unit});
+    for (const Json& objective : objectives)
+      row.push_back(number_cell(objective.at("gradient").value(p.name, Json()), 12));
+  }
+  return table;
+}
+
+void add_gradients(RunPage& page) {
+  page.heading("Gradients");
+  page.table(gradient_table(page.run));
+  for (const auto& [name, objective] : page.run.result.at("objectives").items())
+    add_tornado(page, page.run.problem.scene, name, objective);
+}
+
+std::optional<PlotSeries> series_of(const Trajectory& table, const std::string& name, Mark mark) {
+  const auto found = std::ranges::find(table.columns, name);
+  if (found == table.columns.end() || table.rows.empty()) return std::nullopt;
+  return PlotSeries{name, column(table, 0), column(table, static_cast<std::size_t>(found - table.columns.begin())),
+                    mark};
+}
+
 void add_convergence(RunPage& page, const Trajectory& history, const std::string& unit) {
   if (history.rows.size() < 2) return;
   page.heading("Convergence");
@@ -167,10 +208,10 @@ void add_convergence(RunPage& page, const Trajectory& history, const std::string
   for (const auto& [name, p] : page.run.result.at("parameters").items()) {
     std::optional<PlotSeries> series = series_of(history, name);
     if (!series) continue;
-    const std::optional<Between> between = bounds_of(page.run.problem.scene, name, p);
+    const std::function<double(double)> between = place_between_bounds(page.run.problem.scene, name, p);
     const double initial = p.at("initial").get<double>();
     if (!between && initial == 0) continue;
-    for (double& value : series->y) value = between ? (*between)(value) : value / initial;
+    for (double& value : series->y) value = between ? between(value) : value / initial;
     (between ? bounded : free).series.push_back(*std::move(series));
   }
   for (const LinePlot& plot : {bounded, free})
@@ -234,23 +275,6 @@ void add_multistart(RunPage& page) {
   page.paragraph(fmt::format("Distinct optima: {}.", optima.size()));
   page.table(table_of(
       optima, {{"best start", "start"}, {"starts that ended there", "found_by"}, {"objective", "objective", 6}}));
-}
-
-void add_motion(HtmlPage& page, const std::vector<MovingState>& states) {
-  if (std::ranges::any_of(states, [](const MovingState& state) { return state.trajectory.rows.empty(); })) return;
-  const MovingState& last = states.back();
-  const MotionPlane plane = plane_of_motion(last.scene, last.trajectory);
-  const bool alone = states.size() == 1;  // then one drawing shows both ends
-  std::vector<DrawnState> starts, ends;
-  for (const MovingState& state : states) {
-    starts.push_back({alone ? "start" : state.name, state.scene, state.trajectory.rows.front()});
-    (alone ? starts : ends).push_back({alone ? "end" : state.name, state.scene, state.trajectory.rows.back()});
-  }
-  const std::string stills =
-      mechanism_drawing(alone ? "The mechanism at start and end" : "At the start", plane.axes, starts) +
-      mechanism_drawing("At the end", plane.axes, ends);
-  Json motion = motion_scene(plane, states);
-  motion.is_null() ? page.drawing(stills) : page.motion(std::move(motion), stills);
 }
 
 }  // namespace mbsopt::inline app

@@ -7,13 +7,15 @@
 //   page.write();
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "app/report/html_page.hpp"
-#include "app/report/motion_plots.hpp"
+#include "app/report/line_plot.hpp"
 #include "app/report/motion_scene.hpp"
+#include "app/results/recorded_motion.hpp"
 #include "app/run/run.hpp"
 
 namespace mbsopt::inline app {
@@ -42,19 +44,18 @@ void add_gradients(RunPage& page);
 // Objective, infeasibility and parameters over iterations: the columns of history.csv. unit is that of the objective.
 void add_convergence(RunPage& page, const Trajectory& history, const std::string& unit = "-");
 void add_multistart(RunPage& page);  // the waterfall, where there is one
+// A column over the first one; nothing without that column or without rows.
+std::optional<PlotSeries> series_of(const Trajectory& table, const std::string& name, Mark mark = Mark::line);
 // The moving mechanism, above drawings of its start and end that replace it without a script.
 void add_motion(HtmlPage& page, const std::vector<MovingState>& states);
-
-// The parts of a motion beside its trajectory; each may be empty.
-struct MotionParts {
-  std::vector<PointTarget> targets = {};
-  Trajectory forces = {};                  // of joints (joint_forces.hpp)
-  Trajectory efforts = {};                 // t, then the force or torque of each drive by name; of kinematics
-  std::vector<PlotInstant> instants = {};  // [s] marked in all plots over time
-};
-// All of a simulation: verdict, objectives, motion, plots, sensors, steps.
-void add_simulated_motion(RunPage& page, const Scene& scene, const Trajectory& trajectory,
-                          const MotionParts& parts = {});
+// Limits of sensors over the whole run, by the names of the sensors.
+using SensorLimits = std::vector<std::pair<std::string, PlotLimit>>;
+// Plots of the sensors over time, before (dashed) and after.
+void add_compared_motions(HtmlPage& page, const Scene& scene, const Trajectory& before, const Trajectory& after,
+                          const SensorLimits& limits);
+// All of a simulation: verdict, objectives, motion, plots, sensors, steps. The plots over time mark the instants.
+void add_simulated_motion(RunPage& page, const Scene& scene, const RecordedMotion& motion,
+                          const std::vector<PointTarget>& targets, const std::vector<PlotInstant>& instants = {});
 
 // "all 10 starts" or "3 of 10 starts" of the entry "multistart".
 std::string counted_starts(const Json& multistart);
@@ -64,14 +65,8 @@ std::string starts_in_words(const Json& multistart);
 // "optimum" if the optimiser converged, else "best point": the end of its search. status: as in result.json.
 const char* end_of_search(std::string_view status);
 
-// The place of a value between the bounds of a parameter, from 0 to 1, by its logarithm if that is its scale.
-struct Between {
-  double lower = 0, upper = 1;
-  bool logarithmic = false;
-
-  double operator()(double value) const;
-};
-// None without two bounds. `name` may be "run1.k"; p is an entry of result["parameters"].
-std::optional<Between> bounds_of(const Scene& scene, const std::string& name, const Json& p);
+// The place of a value between the bounds of a parameter, from 0 to 1, by its logarithm if that is its scale. Empty
+// without two bounds. `name` may be "run1.k"; p is an entry of result["parameters"].
+std::function<double(double value)> place_between_bounds(const Scene& scene, const std::string& name, const Json& p);
 
 }  // namespace mbsopt::inline app

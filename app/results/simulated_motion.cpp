@@ -7,7 +7,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include "app/results/joint_forces.hpp"
 #include "app/results/trajectory_mat.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
@@ -83,19 +82,14 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   RunOptions options;
   options.progress = run.watched("simulating");
   const auto recorded = [&](std::span<const Cost> costs) {
-    motion.trajectory = {};
-    Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
-    JointForces forces(scene, rho, sampling.times.size());
+    Sampling sampling = record_motion(mechanism, scene, motion);
     motion.running.rows.clear();
     sampling.observe = [&, record = sampling.observe](std::size_t i, const StatePoint& at) {
       record(i, at);
-      forces.observe(i, at);
       std::vector<double>& row = motion.running.rows.emplace_back(std::vector<double>{at.t});
       for (const auto& term : terms) row.push_back(term ? term->value(at) : std::numeric_limits<double>::quiet_NaN());
     };
-    const SimulationResult result = simulate(mechanism, settings, costs, sampling, options);
-    motion.forces = forces.table();
-    return result;
+    return simulate(mechanism, settings, costs, sampling, options);
   };
   try {
     motion.simulation = run_objectives(objectives, mechanism, settings, recorded, options.progress);
@@ -118,6 +112,14 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   for (std::string& words : missed_peaks(objectives, motion.psi, motion.true_values))
     motion.warnings.push_back(std::move(words));
   return motion;
+}
+
+void add_instants(Run& run, const SimulatedMotion& motion) {
+  Json& objectives = run.result["objectives"];
+  for (std::size_t i = 0; i < motion.instants.size(); ++i)
+    if (const std::string& name = run.problem.objectives[i].name;
+        !motion.instants[i].empty() && objectives.contains(name))
+      objectives[name]["instants"] = motion.instants[i];
 }
 
 void write_trajectory(Run& run, const Trajectory& trajectory, const std::vector<SingularPosition>& singular) {

@@ -2,25 +2,26 @@
 // motion.
 #pragma once
 
-#include "app/results/trajectory_csv.hpp"
+#include "app/results/recorded_motion.hpp"
 #include "app/run/run.hpp"
 
 namespace mbsopt::inline app {
 
-struct SimulatedMotion {
+struct SimulatedMotion : RecordedMotion {  // up to the last good time where the simulation failed
   SimulationResult simulation;
-  Trajectory trajectory;                           // up to the last good time where the simulation failed
   Eigen::VectorXd psi;                             // per objective of the problem, where the simulation is ok
   std::vector<std::optional<double>> true_values;  // of smooth maxima and minima among them
   ModelSummary model;                              // set if the assembly is ok
   std::vector<std::string> warnings;               // of the start
-  Trajectory forces = {};                          // of joints (joint_forces.hpp)
   std::vector<std::vector<double>> instants = {};  // per objective, of its tracked points without prescribed timing [s]
   Trajectory running = {};  // t, then per objective what it integrates or takes the mean or extreme of; NaN: nothing
 };
 
 // Draws the progress of `run`, and stops if the user interrupts.
 SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho);
+
+// Adds the instants of tracked points to the objectives in the result.
+void add_instants(Run& run, const SimulatedMotion& motion);
 
 // Writes trajectory.csv into the folder of the run, with --mat also trajectory.mat. Warns of each column with empty
 // cells. Ctrl-C stops the run without the files.

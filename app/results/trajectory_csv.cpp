@@ -1,23 +1,16 @@
 #include "app/results/trajectory_csv.hpp"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 
-#include "core/run/output_times.hpp"
-
 namespace mbsopt::inline app {
 
-std::vector<std::string> trajectory_columns(const Scene& scene) {
-  std::vector<std::string> columns{"t"};
-  for (const Body& body : scene.bodies) {
-    for (const char* suffix : {"x", "y", "z", "e0", "e1", "e2", "e3", "vx", "vy", "vz", "wx", "wy", "wz"}) {
-      columns.push_back(body.name + "." + suffix);
-    }
-  }
-  for (const Sensor& sensor : scene.sensors) columns.push_back(sensor.name);
-  return columns;
+std::vector<double> column(const Trajectory& table, std::size_t index) {
+  std::vector<double> values;
+  values.reserve(table.rows.size());
+  for (const std::vector<double>& row : table.rows) values.push_back(row[index]);
+  return values;
 }
 
 std::vector<double> body_columns(const Mechanism& mechanism, const StatePoint& at) {
@@ -27,18 +20,6 @@ std::vector<double> body_columns(const Mechanism& mechanism, const StatePoint& a
     row.insert(row.end(), values.begin(), values.end());
   }
   return row;
-}
-
-Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Trajectory& trajectory) {
-  trajectory.columns = trajectory_columns(scene);
-  Sampling sampling;
-  sampling.times = output_times(scene.simulation);
-  sampling.observe = [&mechanism, &trajectory](std::size_t, const StatePoint& at) {
-    std::vector<double> row = body_columns(mechanism, at);
-    for (int sensor = 0; sensor < mechanism.sensors(); ++sensor) row.push_back(mechanism.sensor_value(sensor, at));
-    trajectory.rows.push_back(std::move(row));
-  };
-  return sampling;
 }
 
 std::optional<std::string> to_csv(const Trajectory& trajectory, const std::function<bool(double)>& go_on) {
@@ -57,8 +38,8 @@ std::optional<std::string> to_csv(const Trajectory& trajectory, const std::funct
   return text;
 }
 
-std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) {
-  return *to_csv({columns, rows}, [](double) { return true; });
+std::string to_csv(const Trajectory& trajectory) {
+  return *to_csv(trajectory, [](double) { return true; });
 }
 
 std::string csv_cell(std::string_view text) {

@@ -11,7 +11,6 @@
 #include "app/run/run.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/scene.hpp"
-#include "core/simulate/simulation.hpp"
 
 namespace mbsopt::inline app {
 
@@ -20,18 +19,17 @@ struct Trajectory {
   std::vector<std::vector<double>> rows;  // one value per column
 };
 
-std::vector<std::string> trajectory_columns(const Scene& scene);
+std::vector<double> column(const Trajectory& table, std::size_t index);
+
+inline std::size_t sensor_column(const Scene& scene, std::size_t sensor) {
+  return 1 + 13 * scene.bodies.size() + sensor;
+}
 
 // t and the columns of the bodies at one instant.
 std::vector<double> body_columns(const Mechanism& mechanism, const StatePoint& at);
 
-// A Sampling that appends a row to the trajectory at each output time. Both arguments must outlive it.
-Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Trajectory& trajectory);
-
 // A cell without a finite number is empty.
-std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows);
-inline std::string to_csv(const Trajectory& trajectory) { return to_csv(trajectory.columns, trajectory.rows); }
-
+std::string to_csv(const Trajectory& trajectory);
 // The same text; nothing if `go_on`, which gets the first number of each row, returns false.
 std::optional<std::string> to_csv(const Trajectory& trajectory, const std::function<bool(double)>& go_on);
 

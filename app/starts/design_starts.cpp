@@ -10,7 +10,6 @@
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
-#include "optim/objective/case_objective.hpp"
 #include "optim/objective/evaluator.hpp"
 #include "optim/problem/start_points.hpp"
 #include "optim/solver/nlopt_methods.hpp"
@@ -91,10 +90,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
               {"evaluations", design.evaluations},
               {"simulations", design.simulations},
               {"wall_seconds", design.wall_seconds}};
-  if (design.maximises) record["maximised"] = true;
-  if (design.status == SolverStatus::converged) record["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
-  if (design.mode && design.mode->of > 0) record["assembly_mode"] = mode_json(*design.mode);
-  if (design.closing_steps > 0) record["closing_steps"] = design.closing_steps;
+  add_kind_of_end(record, design);
   for (const DesignVariable& v : design.variables) {
     record["from"][v.name] = v.initial;
     record["parameters"][v.name] = v.value;
@@ -127,12 +123,14 @@ DesignResult result_of_best(Run& run, const Problem& problem, DesignOptions opti
 // Describes the best run, but with the given problem before it.
 void describe_given(const Problem& problem, DesignResult& design) {
   const DesignResult given = given_design(problem);
+  const auto take_initial = [](auto& list, const auto& from) {
+    for (std::size_t k = 0; k < list.size(); ++k) list[k].initial = from[k].initial;
+  };
   design.objective_initial = given.objective_initial;
-  for (std::size_t k = 0; k < design.variables.size(); ++k) design.variables[k].initial = given.variables[k].initial;
-  for (std::size_t i = 0; i < design.constraints.size(); ++i)
-    design.constraints[i].initial = given.constraints[i].initial;
-  for (std::size_t c = 0; c < design.cases.size(); ++c) design.cases[c].initial = given.cases[c].initial;
-  for (std::size_t k = 0; k < design.terms.size(); ++k) design.terms[k].initial = given.terms[k].initial;
+  take_initial(design.variables, given.variables);
+  take_initial(design.constraints, given.constraints);
+  take_initial(design.cases, given.cases);
+  take_initial(design.terms, given.terms);
 }
 
 // Describes a design that ended before its first evaluation.
@@ -191,7 +189,13 @@ DesignOutcome best_of_starts(LongRun& long_run, const Problem& seeded) {
 
 }  // namespace
 
-Json mode_json(const DesignMode& mode) { return {{"mode", mode.mode}, {"of", mode.of}}; }
+void add_kind_of_end(Json& json, const DesignResult& design) {
+  if (design.maximises) json["maximised"] = true;
+  if (design.status == SolverStatus::converged) json["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
+  if (design.mode && design.mode->of > 0)
+    json["assembly_mode"] = {{"mode", design.mode->mode}, {"of", design.mode->of}};
+  if (design.closing_steps > 0) json["closing_steps"] = design.closing_steps;
+}
 
 StartWork design_start_work(Problem problem, const Json& task) {
   problem.design->multistart->seed = task.at("seed").get<long>();

@@ -6,8 +6,8 @@
 
 namespace mbsopt::inline app {
 
-// The JSON members "mode" and "of".
-Json mode_json(const DesignMode& mode);
+// Adds what an end of a search may have: "maximised", "optimum", "assembly_mode", "closing_steps".
+void add_kind_of_end(Json& json, const DesignResult& design);
 
 struct DesignOutcome {
   DesignResult design;

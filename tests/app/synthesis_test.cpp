@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "app/json/read_problem.hpp"
-#include "app/report/point_targets.hpp"
+#include "app/report/motion_scene.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/start/assembly_equations.hpp"

@@ -9,10 +9,10 @@ TEST_CASE("a value between bounds has its place on the scale of the parameter", 
   scene.parameters = {{"k", 1}, {"c", 1}};
   scene.parameters[1].scale = ParameterScale::log10;
   const Json bounds{{"lower", 0.01}, {"upper", 100}};
-  CHECK((*bounds_of(scene, "k", bounds))(50.005) == Approx(0.5));
-  CHECK((*bounds_of(scene, "c", bounds))(1) == Approx(0.5));
-  CHECK((*bounds_of(scene, "run1.c", bounds))(0.1) == Approx(0.25));
-  CHECK_FALSE(bounds_of(scene, "k", {{"lower", 0.01}, {"upper", nullptr}}).has_value());
+  CHECK(place_between_bounds(scene, "k", bounds)(50.005) == Approx(0.5));
+  CHECK(place_between_bounds(scene, "c", bounds)(1) == Approx(0.5));
+  CHECK(place_between_bounds(scene, "run1.c", bounds)(0.1) == Approx(0.25));
+  CHECK_FALSE(place_between_bounds(scene, "k", {{"lower", 0.01}, {"upper", nullptr}}));
 }
 
 TEST_CASE("starts in words: how many of how many, and whether the best one is an optimum", "[report]") {

@@ -12,5 +12,5 @@ TEST_CASE("a cell that a comma would split is quoted, one that a spreadsheet wou
   CHECK(csv_cell("=1+1") == "'=1+1");
   CHECK(csv_cell("@SUM(A1,A2)") == "\"'@SUM(A1,A2)\"");
   CHECK(csv_cell("") == "");
-  CHECK(to_csv(std::vector<std::string>{"t", "=1+1.x", "-a", "+b"}, {{0, 1, 2, 3}}) == "t,'=1+1.x,'-a,'+b\n0,1,2,3\n");
+  CHECK(to_csv({{"t", "=1+1.x", "-a", "+b"}, {{0, 1, 2, 3}}}) == "t,'=1+1.x,'-a,'+b\n0,1,2,3\n");
 }

@@ -12,7 +12,7 @@ using Catch::Contains;
 
 TEST_CASE("a cell without a finite number is empty", "[csv]") {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  CHECK(to_csv({"t", "x", "y"}, {{0.5, kInfinity, 2}, {1, -3, kInfinity - kInfinity}}) == "t,x,y\n0.5,,2\n1,-3,\n");
+  CHECK(to_csv({{"t", "x", "y"}, {{0.5, kInfinity, 2}, {1, -3, kInfinity - kInfinity}}}) == "t,x,y\n0.5,,2\n1,-3,\n");
 }
 
 TEST_CASE("a trajectory whose writing is stopped has no text", "[csv]") {

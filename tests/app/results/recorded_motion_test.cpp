@@ -1,4 +1,4 @@
-#include "app/results/joint_forces.hpp"
+#include "app/results/recorded_motion.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -16,15 +16,9 @@ TEST_CASE("the force of a joint that holds a body on its track is that of a reac
   scene.sensors = {sensor};
   const Eigen::VectorXd rho = parameter_values(scene);
   const Mechanism mechanism(scene, rho);
-  Trajectory trajectory;
-  Sampling sampling = record_trajectory(mechanism, scene, trajectory);
-  JointForces forces(scene, rho, sampling.times.size());
-  sampling.observe = [&, record = sampling.observe](std::size_t i, const StatePoint& at) {
-    record(i, at);
-    forces.observe(i, at);
-  };
-  REQUIRE(simulate(mechanism, scene.simulation, {}, sampling, {}).ok());
-  const Trajectory& table = forces.table();
+  RecordedMotion motion;
+  REQUIRE(simulate(mechanism, scene.simulation, {}, record_motion(mechanism, scene, motion), {}).ok());
+  const Trajectory &table = motion.forces, &trajectory = motion.trajectory;
   CHECK(table.columns == std::vector<std::string>{"t", sensor.joint + ".x", sensor.joint + ".y", sensor.joint + ".z"});
   REQUIRE(table.rows.size() == trajectory.rows.size());
   for (std::size_t k = 0; k < table.rows.size(); ++k) CHECK(table.rows[k][2] == trajectory.rows[k].back());
