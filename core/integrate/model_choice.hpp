@@ -11,9 +11,6 @@ namespace mbsopt {
 // where the settings ask for the planar model and there is none.
 Model model_of(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method);
 
-// Why a run with these settings is not planar; empty where it is. method: null for CVODES.
-std::string why_not_planar(const Mechanism& mechanism, const SimulationSettings& settings, const Method* method);
-
 // Adds to a summary what the settings make of the mechanism.
 void add_model(const Mechanism& mechanism, const SimulationSettings& settings, ModelSummary& summary);
 
