@@ -5,13 +5,14 @@
 namespace mbsopt {
 namespace {
 
-constexpr std::size_t kBlock = 24;       // what an allocation costs beside its contents, at most [bytes]
-constexpr std::size_t kStepListed = 32;  // times and sizes in the list of steps, with room to grow
-constexpr std::size_t kStepBlocks = 2;   // allocations of a StoredStep
-constexpr std::size_t kSnapshotBlocks = 3;
+constexpr std::size_t kBlock = 24;                           // of an allocation beside its contents, at most [bytes]
+constexpr std::size_t kStepListed = 32;                      // times and sizes in the list of steps, with room to grow
 constexpr std::size_t kLeastSteps = 2, kLeastSnapshots = 8;  // below these no budget can push
 
-std::size_t bytes_of(const StoredStep& step) { return step.bytes() + kStepBlocks * kBlock; }
+std::size_t bytes_of(const StoredStep& step) { return step.bytes() + 2 * kBlock; }
+std::size_t bytes_of(const Snapshot& s) {
+  return sizeof(s) + sizeof(double) * static_cast<std::size_t>(s.y0.size() + s.angles.size()) + 3 * kBlock;
+}
 
 }  // namespace
 
@@ -26,22 +27,18 @@ long binomial_split(long blocks, long snapshots) {
 Checkpoints::Checkpoints(const Method& method, double budget_mib)
     : rk_(method), budget_(static_cast<std::size_t>(std::min(budget_mib, 1e9) * 1024 * 1024)) {}
 
+std::size_t Checkpoints::listed() const {
+  return static_cast<std::size_t>(steps_) * kStepListed + events_.size() * sizeof(std::pair<long, SampleEvent>);
+}
+
 std::size_t Checkpoints::limit() const {
-  const std::size_t listed =
-      static_cast<std::size_t>(steps_) * kStepListed + events_.size() * sizeof(std::pair<long, SampleEvent>);
   const std::size_t least = kLeastSteps * step_bytes_ + kLeastSnapshots * snapshot_bytes_;
-  return budget_ > listed + least ? budget_ - listed : least;
+  return budget_ > listed() + least ? budget_ - listed() : least;
 }
 
 void Checkpoints::count(std::size_t more) {
   bytes_ += more;
-  peak_ = std::max(peak_, bytes_ + static_cast<std::size_t>(steps_) * kStepListed +
-                              events_.size() * sizeof(std::pair<long, SampleEvent>));
-}
-
-std::size_t Checkpoints::bytes_of(const Snapshot& s) const {
-  return sizeof(s) + sizeof(double) * static_cast<std::size_t>(s.y0.size() + s.angles.size()) +
-         kSnapshotBlocks * kBlock;
+  peak_ = std::max(peak_, bytes_ + listed());
 }
 
 void Checkpoints::add(Snapshot s) {
@@ -53,19 +50,17 @@ void Checkpoints::keep(const Step& step, std::span<const SampleEvent> events) {
   if (steps_ == 0) {
     Step with_dense_output = step;
     with_dense_output.dense = true;
-    step_bytes_ = mbsopt::bytes_of(StoredStep(with_dense_output, rk_, {}));
+    step_bytes_ = bytes_of(StoredStep(with_dense_output, rk_, {}));
     snapshot_bytes_ = bytes_of(Snapshot{0, step.y0, step.angles0});
   }
   const long index = steps_++;
   if (every_ == 0 && bytes_ + step_bytes_ > limit()) turn_steps_into_snapshots();
   if (every_ == 0) {
     kept_.emplace_back(step, rk_, events);
-    count(mbsopt::bytes_of(kept_.back()));
-    return;
+    return count(bytes_of(kept_.back()));
   }
-  for (const SampleEvent& e : events) {
+  for (const SampleEvent& e : events)
     if (e.cost) events_.emplace_back(index, e);
-  }
   if (index % every_ != 0) return;
   add({index, step.y0, step.angles0});
   thin_out();
@@ -75,7 +70,7 @@ void Checkpoints::turn_steps_into_snapshots() {
   every_ = 1;
   for (long index = 0; !kept_.empty(); ++index) {
     const StoredStep& step = kept_.front();
-    bytes_ -= mbsopt::bytes_of(step);
+    bytes_ -= bytes_of(step);
     for (const SampleEvent& e : step.samples) events_.emplace_back(index, e);
     add({index, step.y0(), step.angles0()});
     kept_.pop_front();
@@ -108,7 +103,7 @@ bool Checkpoints::go_back(const Replay& replay, const StepBack& back) {
 bool Checkpoints::back_over_kept() {
   while (!kept_.empty()) {
     if (!back_(kept_.back())) return false;
-    bytes_ -= mbsopt::bytes_of(kept_.back());
+    bytes_ -= bytes_of(kept_.back());
     kept_.pop_back();
   }
   return true;
@@ -117,7 +112,7 @@ bool Checkpoints::back_over_kept() {
 bool Checkpoints::reverse(const Snapshot& from, long last) {
   const std::size_t length = static_cast<std::size_t>(last - from.step),
                     free = std::max(limit(), bytes_ + step_bytes_) - bytes_;
-  if (length * step_bytes_ <= free) return keep_and_go_back(from, from.step, last);
+  if (length * step_bytes_ <= free) return run_again(from, from.step, last) && back_over_kept();
   const std::size_t block = std::max<std::size_t>(free / 2 / step_bytes_, 1);
   const std::size_t left = free - block * step_bytes_;
   return reverse_blocks(from, last, static_cast<long>(block), 1 + static_cast<long>(left / snapshot_bytes_));
@@ -127,69 +122,42 @@ bool Checkpoints::reverse_blocks(const Snapshot& from, long last, long block, lo
   const long blocks = (last - from.step + block - 1) / block;
   if (snapshots <= 1 || blocks == 1) {
     for (long k = blocks; k-- > 0; last = from.step + k * block) {
-      if (!keep_and_go_back(from, from.step + k * block, last)) return false;
+      if (!run_again(from, from.step + k * block, last) || !back_over_kept()) return false;
     }
     return true;
   }
   Snapshot middle;
   middle.step = from.step + block * binomial_split(blocks, snapshots);
-  if (!advance(from, middle)) return false;
+  if (!run_again(from, middle.step, middle.step, &middle)) return false;
   count(bytes_of(middle));
   if (!reverse_blocks(middle, last, block, snapshots - 1)) return false;
   bytes_ -= bytes_of(middle);
   return reverse_blocks(from, middle.step, block, snapshots);
 }
 
-bool Checkpoints::advance(const Snapshot& from, Snapshot& to) {
-  long index = from.step;
-  ObserverOf sink([&](const SeenStep& step) {
-    if (++index == to.step) {
-      to.y0 = step.to.y;
-      to.angles = step.to.angles;
-    }
-    return std::string();
-  });
-  return run_again(from, to.step, sink);
-}
-
-bool Checkpoints::run_again(const Snapshot& from, long last, StepObserver& sink) {
+bool Checkpoints::run_again(const Snapshot& from, long first, long last, Snapshot* end) {
+  again_ = {from.step, first, last, end};
   recomputed_ += last - from.step;
-  return replay_(from, last, sink);
+  return replay_(from, last, *this);
 }
 
-// Keeps the steps that it sees from `first` on.
-class Checkpoints::Keeper final : public StepObserver {
- public:
-  Keeper(Checkpoints& checkpoints, long index, long first) : all_(checkpoints), index_(index), first_(first) {}
+std::span<const std::pair<long, SampleEvent>> Checkpoints::samples() const {
+  const auto [begin, end] = std::ranges::equal_range(events_, again_.index, {}, &std::pair<long, SampleEvent>::first);
+  return {begin, end};
+}
 
-  bool reads_inside(double) const override { return index_ >= first_ && !samples().empty(); }
-  std::string look_at(const SeenStep& step) override {
-    if (index_ >= first_) {
-      events_.clear();
-      for (const auto& [of, event] : samples()) events_.push_back(event);
-      all_.kept_.emplace_back(*step.stages, all_.rk_, events_);
-      all_.count(mbsopt::bytes_of(all_.kept_.back()));
-    }
-    ++index_;
-    return {};
+std::string Checkpoints::look_at(const SeenStep& step) {
+  if (again_.index >= again_.first) {
+    std::vector<SampleEvent> events;
+    for (const auto& [of, event] : samples()) events.push_back(event);
+    kept_.emplace_back(*step.stages, rk_, events);
+    count(bytes_of(kept_.back()));
   }
-
- private:
-  std::span<const std::pair<long, SampleEvent>> samples() const {  // of the present step
-    const auto [begin, end] =
-        std::equal_range(all_.events_.begin(), all_.events_.end(), std::pair(index_, SampleEvent{}),
-                         [](const auto& a, const auto& b) { return a.first < b.first; });
-    return std::span(begin, end);
+  if (++again_.index == again_.last && again_.end) {
+    again_.end->y0 = step.to.y;
+    again_.end->angles = step.to.angles;
   }
-  Checkpoints& all_;
-  long index_, first_;
-  std::vector<SampleEvent> events_;
-};
-
-// Computes from..last again, keeps the steps from `first` on, and goes back over these.
-bool Checkpoints::keep_and_go_back(const Snapshot& from, long first, long last) {
-  Keeper keeper(*this, from.step, first);
-  return run_again(from, last, keeper) && back_over_kept();
+  return {};
 }
 
 }  // namespace mbsopt

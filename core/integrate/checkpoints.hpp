@@ -29,7 +29,7 @@ struct Snapshot {
 // Where to place the next snapshot: after how many of N >= 2 blocks, with s snapshots in all.
 long binomial_split(long blocks, long snapshots);
 
-class Checkpoints {
+class Checkpoints : private StepObserver {
  public:
   Checkpoints(const Method& method, double budget_mib);
 
@@ -47,18 +47,19 @@ class Checkpoints {
   long recomputed_steps() const { return recomputed_; }
 
  private:
-  std::size_t limit() const;  // of what is kept beside the list of steps
+  std::size_t listed() const;  // of the list of steps and its samples
+  std::size_t limit() const;   // of what is kept beside it
   void count(std::size_t more);
-  std::size_t bytes_of(const Snapshot& s) const;
   void add(Snapshot s);
   void thin_out();
   void turn_steps_into_snapshots();
   bool reverse(const Snapshot& from, long last);
   bool reverse_blocks(const Snapshot& from, long last, long block, long snapshots);
-  class Keeper;
-  bool keep_and_go_back(const Snapshot& from, long first, long last);
-  bool advance(const Snapshot& from, Snapshot& to);
-  bool run_again(const Snapshot& from, long last, StepObserver& sink);
+  // Computes steps from..last again and keeps those from `first` on. `end` becomes the state after them.
+  bool run_again(const Snapshot& from, long first, long last, Snapshot* end = nullptr);
+  std::span<const std::pair<long, SampleEvent>> samples() const;  // in the step that is computed again
+  bool reads_inside(double) const override { return again_.index >= again_.first && !samples().empty(); }
+  std::string look_at(const SeenStep& step) override;
   bool back_over_kept();
 
   const Method& rk_;
@@ -68,6 +69,10 @@ class Checkpoints {
   std::deque<StoredStep> kept_;
   std::deque<Snapshot> snapshots_;
   std::vector<std::pair<long, SampleEvent>> events_;  // by step, where steps are not kept
+  struct {
+    long index = 0, first = 0, last = 0;  // of the next step
+    Snapshot* end = nullptr;
+  } again_;
   Replay replay_;
   StepBack back_;
 };
