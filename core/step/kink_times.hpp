@@ -20,43 +20,62 @@
 
 namespace mbsopt {
 
-// Kinks of several signals in the order of time, for times that only grow.
-class KinkTimes {
+class KinkControl {
  public:
-  KinkTimes(const std::vector<KinkedSignal>& signals, double start, double end)
-      : end_(end), gap_(16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(start), std::abs(end))) {
-    for (const KinkedSignal& signal : signals) sources_.push_back({signal, 0, significant_change(*signal.curve)});
+  KinkControl(const std::vector<KinkedSignal>& signals, double start, double end)
+      : smooth_(std::ranges::none_of(signals, is_sharp)),
+        root_(root_of(signals)),
+        end_(end),
+        gap_(16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(start), std::abs(end))) {
+    for (const KinkedSignal& signal : signals)
+      if (smooth_ || is_sharp(signal)) sources_.push_back({signal, 0, significant_change(*signal.curve)});
   }
 
-  bool any() const { return !sources_.empty(); }
-  double gap() const { return gap_; }
+  // The size of the step at t, of which h is proposed; fixed: steps that no error controls.
+  double choose(double t, double h, bool fixed) {
+    state_ = State::clear;
+    if (sources_.empty()) return h;
+    const double next = first_after(t);
+    if (t + h < next - 1.5 * gap_ || (smooth_ && fixed)) return h;
+    if (smooth_ && !limits(h)) {
+      state_ = State::crosses;
+      kink_ = kNone;
+      return h;
+    }
+    const double reach = fixed ? h : std::min(h, across_);
+    const double last = reach >= 2 * (next - t) ? last_until(t + reach) : next;
+    state_ = last > next ? State::crosses : State::meets;
+    kink_ = std::max(last, next);
+    return kink_ - gap_ - t;
+  }
+  // How near to the end a step may stop where a kink lies there.
+  double gap() const { return sources_.empty() ? 0 : 1.5 * gap_; }
+  bool crosses() const { return state_ == State::crosses; }
+  bool meets() const { return state_ == State::meets; }
+  // Returns whether kinks allow less than h.
+  bool limits(double h) const { return across_ < h; }
+  // Returns whether a step that ends at t1 has come to the kink that choose() gave.
+  bool reached(double t1) const { return state_ != State::clear && t1 >= kink_ - 1.5 * gap_; }
+  double resume_time() const { return kink_ + gap_; }
 
-  // The first kink after t, and the last one that is not after t1; infinity where there is none in the run.
-  double first_after(double t) {
-    double first = std::numeric_limits<double>::infinity();
-    for (Source& source : sources_) {
-      const std::vector<double>& x = source.signal.curve->x();
-      while (source.next < x.size() && (!source.matters(source.next) || source.time(source.next) <= t + 2 * gap_))
-        ++source.next;
-      if (source.next < x.size()) first = std::min(first, source.time(source.next));
-    }
-    return first <= end_ + gap_ ? first : std::numeric_limits<double>::infinity();
-  }
-  double last_until(double t1) const {
-    double last = -std::numeric_limits<double>::infinity();
-    for (const Source& source : sources_) {
-      const std::vector<double>& x = source.signal.curve->x();
-      const auto after = std::upper_bound(x.begin(), x.end(), t1 - source.signal.delay);
-      for (std::size_t i = static_cast<std::size_t>(after - x.begin()); i-- > source.next;) {
-        if (!source.matters(i)) continue;
-        last = std::max(last, source.time(i));
-        break;
-      }
-    }
-    return last;
-  }
+  // Reports a step of size h that crosses kinks; its error is in tolerances.
+  void accepted_across(double h, double error) { across_ = h * factor(error, kMost); }
+  void rejected_across(double h, double error) { across_ = h * factor(error, kShrunk); }
+  void met() { across_ *= kRecovery; }
 
  private:
+  enum class State { clear, meets, crosses };
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  static constexpr double kLeast = 0.01;       // sizes without kinks may have grown far beyond what crosses them
+  static constexpr double kMost = 6;           // times the last step: the most that other steps grow (step_control.hpp)
+  static constexpr double kSmallError = 1e-6;  // allows more than kMost
+  static constexpr double kShrunk = 0.9;       // after a rejection at most
+  static constexpr double kRecovery = 1.1;     // of two intervals down to half of one: 15 steps until the next try
+  double factor(double error, double most) const {
+    return std::isfinite(error) ? std::clamp(0.9 / std::pow(std::max(error, kSmallError), root_), kLeast, most)
+                                : kLeast;
+  }
+
   struct Source {
     KinkedSignal signal;
     std::size_t next;
@@ -75,66 +94,33 @@ class KinkTimes {
     return kDigits * (curve.interpolation() == Interpolation::hold ? size : size / span);
   }
 
-  std::vector<Source> sources_;
-  double end_, gap_;
-};
-
-class KinkControl {
- public:
-  KinkControl(const std::vector<KinkedSignal>& signals, double start, double end)
-      : smooth_(std::none_of(signals.begin(), signals.end(), is_sharp)),
-        root_(root_of(signals)),
-        kinks_(sharpest(signals, smooth_), start, end) {}
-
-  // The size of the step at t, of which h is proposed; fixed: steps that no error controls.
-  double choose(double t, double h, bool fixed) {
-    state_ = State::clear;
-    if (!kinks_.any()) return h;
-    const double next = kinks_.first_after(t);
-    if (t + h < next - 1.5 * kinks_.gap() || (smooth_ && fixed)) return h;
-    if (smooth_ && !limits(h)) {
-      state_ = State::crosses;
-      kink_ = std::numeric_limits<double>::infinity();
-      return h;
+  // The first kink after t, and the last one that is not after t1, for times that only grow; infinity where there is
+  // none in the run.
+  double first_after(double t) {
+    double first = kNone;
+    for (Source& source : sources_) {
+      const std::size_t size = source.signal.curve->x().size();
+      while (source.next < size && (!source.matters(source.next) || source.time(source.next) <= t + 2 * gap_))
+        ++source.next;
+      if (source.next < size) first = std::min(first, source.time(source.next));
     }
-    const double reach = fixed ? h : std::min(h, across_);
-    const double last = reach >= 2 * (next - t) ? kinks_.last_until(t + reach) : next;
-    state_ = last > next ? State::crosses : State::meets;
-    kink_ = std::max(last, next);
-    return kink_ - kinks_.gap() - t;
+    return first <= end_ + gap_ ? first : kNone;
   }
-  // How near to the end a step may stop where a kink lies there.
-  double gap() const { return kinks_.any() ? 1.5 * kinks_.gap() : 0; }
-  bool crosses() const { return state_ == State::crosses; }
-  bool meets() const { return state_ == State::meets; }
-  // Returns whether kinks allow less than h.
-  bool limits(double h) const { return across_ < h; }
-  // Returns whether a step that ends at t1 has come to the kink that choose() gave.
-  bool reached(double t1) const { return state_ != State::clear && t1 >= kink_ - 1.5 * kinks_.gap(); }
-  double resume_time() const { return kink_ + kinks_.gap(); }
-
-  // Reports a step of size h that crosses kinks; its error is in tolerances.
-  void accepted_across(double h, double error) { across_ = h * factor(error, kMost); }
-  void rejected_across(double h, double error) { across_ = h * factor(error, kShrunk); }
-  void met() { across_ *= kRecovery; }
-
- private:
-  enum class State { clear, meets, crosses };
-  static constexpr double kLeast = 0.01;       // sizes without kinks may have grown far beyond what crosses them
-  static constexpr double kMost = 6;           // times the last step: the most that other steps grow (step_control.hpp)
-  static constexpr double kSmallError = 1e-6;  // allows more than kMost
-  static constexpr double kShrunk = 0.9;       // after a rejection at most
-  static constexpr double kRecovery = 1.1;     // of two intervals down to half of one: 15 steps until the next try
-  double factor(double error, double most) const {
-    return std::isfinite(error) ? std::clamp(0.9 / std::pow(std::max(error, kSmallError), root_), kLeast, most)
-                                : kLeast;
+  double last_until(double t1) const {
+    double last = -kNone;
+    for (const Source& source : sources_) {
+      const std::vector<double>& x = source.signal.curve->x();
+      const auto after = std::upper_bound(x.begin(), x.end(), t1 - source.signal.delay);
+      for (std::size_t i = static_cast<std::size_t>(after - x.begin()); i-- > source.next;) {
+        if (!source.matters(i)) continue;
+        last = std::max(last, source.time(i));
+        break;
+      }
+    }
+    return last;
   }
 
   static bool is_sharp(const KinkedSignal& signal) { return signal.curve->interpolation() != Interpolation::spline; }
-  static std::vector<KinkedSignal> sharpest(std::vector<KinkedSignal> signals, bool smooth) {
-    if (!smooth) std::erase_if(signals, [](const KinkedSignal& signal) { return !is_sharp(signal); });
-    return signals;
-  }
   static double root_of(const std::vector<KinkedSignal>& signals) {
     int order = 3;
     for (const KinkedSignal& signal : signals) order = std::min(order, std::max(1, signal.order));
@@ -143,10 +129,11 @@ class KinkControl {
 
   bool smooth_;
   double root_;
-  KinkTimes kinks_;
+  std::vector<Source> sources_;
+  double end_, gap_;
   State state_ = State::clear;
   double kink_ = 0;
-  double across_ = std::numeric_limits<double>::infinity();  // nothing is known against it
+  double across_ = kNone;  // nothing is known against it
 };
 
 }  // namespace mbsopt
