@@ -34,21 +34,16 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
       for (int i = 0; i < g.size(); ++i) {
         for (int j = 0; j < g.size(); ++j) A(i, j) = rk_.a(g.first + i, g.first + j);
       }
-      for (std::size_t k = 0; k < matrices_.size(); ++k) {
-        if (matrices_[k].A == A) found = static_cast<int>(k);
-      }
-      if (found < 0) {
-        found = static_cast<int>(matrices_.size());
-        matrices_.push_back({A, StageMatrix(data_, start_.jacobian(), g.size())});
-      }
+      found = static_cast<int>(std::ranges::find(matrices_, A, &Matrix::A) - matrices_.begin());
+      if (at(found) == matrices_.size()) matrices_.push_back({A, StageMatrix(data_, start_.jacobian(), g.size())});
       largest = std::max(largest, g.size());
     }
     for (int i = g.first; i <= g.last; ++i) matrix_of_.push_back(found);
   }
   const Eigen::Index rows = StageEquations::count(data_);
-  own_values_.assign(static_cast<std::size_t>(largest), start_.values());
+  own_values_.assign(at(largest), start_.values());
   for (Points* points : {&past_, &present_}) {
-    points->places.assign(static_cast<std::size_t>(rk_.stages), {0, Eigen::VectorXd::Zero(rows)});
+    points->places.assign(at(rk_.stages), {0, Eigen::VectorXd::Zero(rows)});
   }
   x_.setZero(rows, largest);
   r_.setZero(rows * largest, 1);
@@ -77,8 +72,6 @@ void ImplicitStages::begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eig
   age_ = 0;
   rate_ = 1;
 }
-
-void ImplicitStages::new_attempt() { present_.count = 0; }
 
 void ImplicitStages::accept(const Step& step) {
   const Eigen::Index n = layout_.positions();
@@ -166,11 +159,11 @@ bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Mat
     y_ = step.Y.col(stage);
     start_.equations().place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0,
                                 step.K.col(stage).tail(layout_.positions()), step.lambda.col(stage));
-    start_.jacobian().evaluate(start_.equations(), own_values_[static_cast<std::size_t>(i)]);
+    start_.jacobian().evaluate(start_.equations(), own_values_[at(i)]);
     ++own_jacobians_;
   }
   m.jacobian = -1;  // not that of the start
-  return m.matrix.factor(step.h, m.A, std::span(own_values_).first(static_cast<std::size_t>(g.size())));
+  return m.matrix.factor(step.h, m.A, std::span(own_values_).first(at(g.size())));
 }
 
 // Residuals of the group's stages at x_ into r_.
@@ -270,7 +263,7 @@ ImplicitStages::Convergence ImplicitStages::judged(double now, double before, lo
 }
 
 bool ImplicitStages::solve(Step& step, const StageGroup& g, Goal goal) {
-  Matrix& m = matrices_[static_cast<std::size_t>(matrix_of_[static_cast<std::size_t>(g.first)])];
+  Matrix& m = matrices_[at(matrix_of_[at(g.first)])];
   bool solved = own_steps_ == 0 && iterate(step, g, m, goal, false);
   if (!solved) {
     if (stale()) return false;  // a new Jacobian at the start is tried first

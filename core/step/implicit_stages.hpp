@@ -31,7 +31,7 @@ class ImplicitStages {
   // The motion at the start of the run: a, lambda at step.y0.
   void begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda);
   // Before each attempt at a step.
-  void new_attempt();
+  void new_attempt() { present_.count = 0; }
   // Solves the stages of a group; earlier groups are solved. False: no convergence.
   enum class Goal {
     tolerance,  // a fraction of it, from a guess

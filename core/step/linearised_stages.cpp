@@ -6,16 +6,11 @@ namespace mbsopt {
 
 LinearisedStages::LinearisedStages(const MechanismData& data, const Method& method, SpatialDynamics& dynamics)
     : rk_(method), equations_(dynamics), jacobian_(data) {
-  values_.assign(static_cast<std::size_t>(largest_implicit_group(method)), jacobian_.values());
-  std::vector<int> sizes;
+  values_.assign(at(largest_implicit_group(method)), jacobian_.values());
   for (const StageGroup& g : method.stage_groups()) {
-    if (is_implicit(method, g)) sizes.push_back(g.size());
-  }
-  std::sort(sizes.begin(), sizes.end());
-  sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());
-  for (const int stages : sizes) {
-    matrices_.emplace_back(data, jacobian_, stages);
-    A_.push_back(Eigen::MatrixXd::Zero(stages, stages));
+    if (!is_implicit(method, g) || of(g) < matrices_.size()) continue;
+    matrices_.emplace_back(data, jacobian_, g.size());
+    A_.push_back(Eigen::MatrixXd::Zero(g.size(), g.size()));
   }
 }
 
@@ -27,13 +22,13 @@ StageEquations& LinearisedStages::place_at(const Step& step, int i) {
 }
 
 StageEquations& LinearisedStages::linearise(const Step& step, int stage, int k) {
-  jacobian_.evaluate(place_at(step, stage), values_[static_cast<std::size_t>(k)]);
+  jacobian_.evaluate(place_at(step, stage), values_[at(k)]);
   return equations_;
 }
 
 std::size_t LinearisedStages::of(const StageGroup& group) const {
   std::size_t k = 0;
-  while (matrices_[k].stages() != group.size()) ++k;
+  while (k < matrices_.size() && matrices_[k].stages() != group.size()) ++k;
   return k;
 }
 
@@ -42,8 +37,7 @@ bool LinearisedStages::factor(double h, const StageGroup& g) {
   for (int i = 0; i < g.size(); ++i) {
     for (int j = 0; j < g.size(); ++j) A(i, j) = rk_.a(g.first + i, g.first + j);
   }
-  return matrices_[of(g)].factor(h, A, std::span(values_).first(static_cast<std::size_t>(g.size())),
-                                 StageMatrix::Trial::by_solutions);
+  return matrices_[of(g)].factor(h, A, std::span(values_).first(at(g.size())), StageMatrix::Trial::by_solutions);
 }
 
 void LinearisedStages::solve(const StageGroup& g, Eigen::MatrixXd& x) {

@@ -27,7 +27,7 @@ class LinearisedStages {
   long places() const { return equations_.places(); }
 
  private:
-  std::size_t of(const StageGroup& group) const;  // which matrix
+  std::size_t of(const StageGroup& group) const;  // which matrix; how many there are if it has none
 
   const Method& rk_;
   StageEquations equations_;
