@@ -8,12 +8,12 @@ namespace mbsopt {
 
 AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
                            std::span<const Cost> costs, bool watched, const StatePoint& end)
-    : Sweep(mechanism, settings, method, costs, watched),
-      step_(make_step(mechanism, method, projector_->solution())),
-      bars_(costs.size()) {
+    : Sweep(mechanism, settings, method, costs, watched), step_(make_step(mechanism, method, projector_->solution())) {
   const MechanismData& d = mechanism.data();
   const Eigen::Index states = mechanism.states(), objectives = static_cast<Eigen::Index>(costs.size());
-  for (Bars& b : bars_) {
+  for (Eigen::Index o = 0; o < objectives; ++o) {
+    Bars& b = bars_.emplace_back();
+    b.objective = o;
     for (Eigen::VectorXd* x : {&b.lambda, &b.lambda_hat, &b.samples}) x->setZero(states);
     b.theta.setZero(d.slots());
     b.rho.setZero(d.rho.size());
@@ -22,6 +22,8 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
       b.start.setZero(states);
       b.common.setZero(states);
     }
+    const PointCost* const terminal = costs[static_cast<std::size_t>(o)].terminal.get();
+    if (terminal) terminal->add_gradient(end, 1, b.lambda, b.rho);
   }
   if (const int coupled = largest_implicit_group(rk_); coupled > 0)
     x_bar_.setZero(coupled * StageEquations::count(d), objectives);
@@ -29,8 +31,6 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
   for (Eigen::VectorXd* x : {&w_, &y_bar_}) x->setZero(states);
   r_bar_.setZero(StageEquations::count(d));
   explicit_swept_.reserve(static_cast<std::size_t>(rk_.dense_stages));
-  for (std::size_t o = 0; o < costs_.size(); ++o)
-    if (costs_[o].terminal) costs_[o].terminal->add_gradient(end, 1, bars_[o].lambda, bars_[o].rho);
 }
 
 void AdjointSweep::rebuild(const StoredStep& step) {
@@ -58,15 +58,15 @@ void AdjointSweep::sample_back(const StoredStep& step) {
 
 double AdjointSweep::magnification(const Eigen::VectorXd& psi) const {
   double most = 0;
-  for (Eigen::Index o = 0; o < psi.size(); ++o)
-    if (psi(o) != 0) most = std::max(most, bars_[static_cast<std::size_t>(o)].largest / std::abs(psi(o)));
+  for (const Bars& b : bars_)
+    if (const double size = std::abs(psi(b.objective)); size != 0) most = std::max(most, b.largest / size);
   return most;
 }
 
 bool AdjointSweep::step_back(const StoredStep& step) {
   rebuild(step);
-  for (Bars& b : bars_) b.largest = std::max(b.largest, b.lambda.cwiseAbs().dot(step_.y1.cwiseAbs()));
   for (Bars& b : bars_) {
+    b.largest = std::max(b.largest, b.lambda.cwiseAbs().dot(step_.y1.cwiseAbs()));
     b.lambda_hat.setZero();
     b.samples.setZero();
     b.K.setZero();
@@ -111,10 +111,9 @@ bool AdjointSweep::stages_back() {
 void AdjointSweep::nodes_back() {
   for (int m = 0; m < rk_.nodes; ++m) {
     node_state(rk_, step_, m, y_);
-    for (std::size_t o = 0; o < bars_.size(); ++o) {
-      Bars& b = bars_[o];
+    for (Bars& b : bars_) {
       y_bar_.setZero();
-      add_running_cost(o, m);
+      add_running_cost(b, m);
       b.samples += y_bar_;
       for (int i = 0; i < rk_.stages; ++i) b.K.col(i) += (step_.h * rk_.dense_weight(i, rk_.node_c[m])) * y_bar_;
     }
@@ -132,14 +131,11 @@ bool AdjointSweep::rosenbrock_back() {
   if (!rosenbrock.factor(step_)) return false;
   for (Bars& b : bars_) b.common.setZero();
   for (int i = rk_.stages - 1; i >= 0; --i) {
-    for (std::size_t o = 0; o < bars_.size(); ++o) x_bar_.col(static_cast<Eigen::Index>(o)) = bars_[o].K.col(i);
-    for (Eigen::Index first = 0; first < x_bar_.cols(); first += kLanes) {
-      rosenbrock.solve_transposed(x_bar_.middleCols(first, std::min<Eigen::Index>(kLanes, x_bar_.cols() - first)));
-    }
+    for (const Bars& b : bars_) x_bar_.col(b.objective) = b.K.col(i);
+    rosenbrock.solve_transposed(x_bar_);
     if (i > 0 && !rosenbrock.linearise_stage(step_, i)) return false;
-    for (std::size_t o = 0; o < bars_.size(); ++o) {
-      Bars& b = bars_[o];
-      const auto r_bar = x_bar_.col(static_cast<Eigen::Index>(o));
+    for (Bars& b : bars_) {
+      const auto r_bar = x_bar_.col(b.objective);
       for (int j = 0; j < i; ++j) b.K.col(j) += (rk_.gamma_of(i, j) / g) * (r_bar - b.K.col(i));
       b.common.tail(n) += rk_.gamma_sum[i] * r_bar.tail(n);
       if (i == 0) {
@@ -157,10 +153,10 @@ bool AdjointSweep::rosenbrock_back() {
     for (const int sign : {-1, 1}) {
       if (i == 0) break;  // w_0 = 0
       if (!rosenbrock.linearise_own(step_, i, sign)) return false;
-      for (std::size_t o = 0; o < bars_.size(); ++o) {
+      for (Bars& b : bars_) {
         w_.setZero();
-        w_.tail(n) = rosenbrock.own_weight(sign) * x_bar_.col(static_cast<Eigen::Index>(o)).tail(n);
-        dynamics_.add_adjoint(w_, bars_[o].lambda, bars_[o].theta, bars_[o].rho);
+        w_.tail(n) = rosenbrock.own_weight(sign) * x_bar_.col(b.objective).tail(n);
+        dynamics_.add_adjoint(w_, b.lambda, b.theta, b.rho);
       }
     }
   }
@@ -175,23 +171,21 @@ bool AdjointSweep::rosenbrock_back() {
   return true;
 }
 
-// The gradient of the running cost at a node, whose state is y_, into y_bar_ and the objective's rho.
-void AdjointSweep::add_running_cost(std::size_t objective, int node) {
-  if (!set_running_gradient(step_, objective, node)) return;
-  y_bar_ += g_y_;
-  bars_[objective].rho += g_rho_;
+void AdjointSweep::add_running_cost(Bars& b, int node) {
+  if (!set_running_gradient(step_, static_cast<std::size_t>(b.objective), node)) return;
+  y_bar_ += g_.y;
+  b.rho += g_.rho;
 }
 
 bool AdjointSweep::explicit_back(int i) {
   if (!linearise_stage(step_, i)) return false;
-  for (std::size_t o = 0; o < bars_.size(); ++o) {
-    Bars& b = bars_[o];
+  for (Bars& b : bars_) {
     StageSum w;  // kbar_i
     for (const int j : explicit_swept_) w.add(step_.h * rk_.a(j, i), b.Y.col(j).data());
     w.to(b.K.col(i).data(), w_.data(), w_.size());
     y_bar_.setZero();
     dynamics_.add_adjoint(w_, y_bar_, b.theta, b.rho);
-    add_running_cost(o, i);
+    add_running_cost(b, i);
     b.Y.col(i) = y_bar_;
   }
   explicit_swept_.push_back(i);
@@ -208,14 +202,13 @@ bool AdjointSweep::implicit_back(const StageGroup& g) {
   for (int i = g.first; i <= g.last; ++i) equations = &implicit_->linearise(step_, i, i - g.first);
   if (!implicit_->factor(step_.h, g)) return false;
 
-  for (std::size_t o = 0; o < bars_.size(); ++o) {
-    Bars& b = bars_[o];
-    auto x_bar = x_bar_.col(static_cast<Eigen::Index>(o));
+  for (Bars& b : bars_) {
+    auto x_bar = x_bar_.col(b.objective);
     x_bar.setZero();
     for (int i = g.first; i <= g.last; ++i) {
       y_bar_.setZero();
       y_ = step_.Y.col(i);
-      add_running_cost(o, i);
+      add_running_cost(b, i);
       b.Y.col(i) = y_bar_;
     }
     for (int i = g.first; i <= g.last; ++i) {
@@ -234,9 +227,8 @@ bool AdjointSweep::implicit_back(const StageGroup& g) {
 
   for (int i = g.last; i >= g.first; --i) {
     if (i != g.last) implicit_->place_at(step_, i);  // where the last still is
-    for (std::size_t o = 0; o < bars_.size(); ++o) {
-      Bars& b = bars_[o];
-      r_bar_ = x_bar_.col(static_cast<Eigen::Index>(o)).segment((i - g.first) * rows, rows);
+    for (Bars& b : bars_) {
+      r_bar_ = x_bar_.col(b.objective).segment((i - g.first) * rows, rows);
       y_bar_.setZero();
       equations->add_adjoint(r_bar_, y_bar_, b.theta, b.rho);
       b.Y.col(i) += y_bar_;
@@ -257,17 +249,16 @@ bool AdjointSweep::implicit_back(const StageGroup& g) {
 
 Eigen::MatrixXd AdjointSweep::lambda() const {
   Eigen::MatrixXd lambda(mechanism_.states(), static_cast<Eigen::Index>(bars_.size()));
-  for (std::size_t o = 0; o < bars_.size(); ++o) lambda.col(static_cast<Eigen::Index>(o)) = bars_[o].lambda;
+  for (const Bars& b : bars_) lambda.col(b.objective) = b.lambda;
   return lambda;
 }
 
 Eigen::MatrixXd AdjointSweep::mu() const {
   const MechanismData& d = mechanism_.data();
   Eigen::MatrixXd mu(d.rho.size(), static_cast<Eigen::Index>(bars_.size()));
-  for (std::size_t o = 0; o < bars_.size(); ++o) {
-    auto of_objective = mu.col(static_cast<Eigen::Index>(o));
-    of_objective = bars_[o].rho;
-    d.add_to_rho(bars_[o].theta, of_objective);
+  for (const Bars& b : bars_) {
+    mu.col(b.objective) = b.rho;
+    d.add_to_rho(b.theta, mu.col(b.objective));
   }
   return mu;
 }

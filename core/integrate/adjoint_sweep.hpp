@@ -30,6 +30,7 @@ class AdjointSweep : public Sweep {
  private:
   // The cotangents of one objective.
   struct Bars {
+    Eigen::Index objective;
     Eigen::VectorXd lambda, lambda_hat;  // at y1, from there on at y0; at y^
     Eigen::VectorXd theta, rho;          // of all that was swept
     Eigen::VectorXd samples;             // what samples in the step see of y0
@@ -46,7 +47,8 @@ class AdjointSweep : public Sweep {
   bool implicit_back(const StageGroup& group);
   bool rosenbrock_back();
   void nodes_back();
-  void add_running_cost(std::size_t objective, int node);
+  // Adds the gradient of the running cost at a node, whose state is y_, to y_bar_ and the objective's rho.
+  void add_running_cost(Bars& b, int node);
 
   Step step_;                        // in hand
   std::vector<int> explicit_swept_;  // its explicit stages whose bars are known

@@ -17,8 +17,8 @@ Sweep::Sweep(const Mechanism& mechanism, const SimulationSettings& settings, con
   if (watched) watch_.emplace(mechanism, method, costs, QuadratureWatch::Of::gradients, nullptr);
   if (largest_implicit_group(rk_) > 0) implicit_.emplace(d, rk_, dynamics_.in_space());
   if (rk_.gamma) rosenbrock_.emplace(mechanism, rk_, dynamics_);
-  for (Eigen::VectorXd* x : {&y_, &ydot_, &g_y_}) x->setZero(mechanism.states());
-  g_rho_.setZero(d.rho.size());
+  for (Eigen::VectorXd* x : {&y_, &ydot_, &g_.y}) x->setZero(mechanism.states());
+  g_.rho.setZero(d.rho.size());
 }
 
 bool Sweep::linearise_stage(const Step& step, int i) {
@@ -27,20 +27,14 @@ bool Sweep::linearise_stage(const Step& step, int i) {
   return dynamics_.linearise(t, y_, step.angles0, step.K.col(i).tail(y_.size() / 2), step.lambda.col(i));
 }
 
-void Sweep::set_gradient(const PointCost& cost, const StatePoint& at, double weight) {
-  g_y_.setZero();
-  g_rho_.setZero();
-  cost.add_gradient(at, weight, g_y_, g_rho_);
-}
-
 bool Sweep::set_running_gradient(const Step& step, std::size_t objective, int node) {
   const PointCost* const running = costs_[objective].running.get();
   if (!running || node >= rk_.nodes || rk_.node_b[node] == 0) return false;
   const double weight = step.h * rk_.node_b[node];
-  set_gradient(*running, {step.t + rk_.node_c[node] * step.h, y_, step.angles0, motion()}, weight);
+  g_.set(*running, {step.t + rk_.node_c[node] * step.h, y_, step.angles0, motion()}, weight);
   if (!watch_) return true;
   node_rate(rk_, step, node, ydot_);
-  watch_->take_gradient(objective, node, weight, g_y_, ydot_, g_rho_);
+  watch_->take_gradient(objective, node, weight, g_.y, ydot_, g_.rho);
   return true;
 }
 

@@ -30,9 +30,7 @@ class Sweep {
   ~Sweep() = default;
 
   bool linearise_stage(const Step& step, int i);  // an explicit one; y_ becomes its state
-  // The gradient of a cost times a weight, into g_y_ and g_rho_.
-  void set_gradient(const PointCost& cost, const StatePoint& at, double weight);
-  // The same of a running cost at a node of the step, whose state is y_; false: there is nothing to add.
+  // Sets g_ to that of a running cost at a node of the step, whose state is y_; false: there is nothing to add.
   bool set_running_gradient(const Step& step, std::size_t objective, int node);
   void end_step(const Step& step) {
     if (watch_) watch_->end_step(step);
@@ -46,7 +44,8 @@ class Sweep {
   std::unique_ptr<Projector> projector_;
   std::optional<LinearisedStages> implicit_;
   std::optional<RosenbrockStages> rosenbrock_;
-  Eigen::VectorXd y_, g_y_, g_rho_;
+  Eigen::VectorXd y_;
+  CostGradient g_;
 
  private:
   std::optional<MotionSolver> motion_;  // where some sensor needs it

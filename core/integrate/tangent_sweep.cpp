@@ -20,7 +20,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
   if (rk_.gamma) {
     for (int i = 0; i < rk_.stages; ++i) {
       std::array<double, Method::kMaxStages> of_k{};
-      for (int j = 0; j < i; ++j) of_k[static_cast<std::size_t>(j)] = rk_.gamma_of(i, j) / rk_.gamma_of(0, 0);
+      for (int j = 0; j < i; ++j) of_k[at(j)] = rk_.gamma_of(i, j) / rk_.gamma_of(0, 0);
       of_s_.push_back(integrated(of_k.data()));
     }
     a_.setZero(states / 2, kLanes);
@@ -31,13 +31,12 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     Block b;
     b.parameters = std::move(p);
     for (LaneRows* x : {&b.y0, &b.y_hat, &b.y1, &b.Y}) x->setZero(states, kLanes);
-    b.a.assign(static_cast<std::size_t>(rk_.dense_stages), LaneRows::Zero(states / 2, kLanes));
-    b.Y_stage.assign(static_cast<std::size_t>(coupled), LaneRows::Zero(states, kLanes));
+    b.a.assign(at(rk_.dense_stages), LaneRows::Zero(states / 2, kLanes));
+    b.Y_stage.assign(at(coupled), LaneRows::Zero(states, kLanes));
     b.x.setZero(rk_.gamma ? states : coupled * StageEquations::count(d), kLanes);
     if (rk_.gamma) b.common.setZero(states / 2, kLanes);
-    for (int k = 0; k < kLanes; ++k) {
-      if (b.parameters.parameter[k] >= 0) b.y0.col(k) = y_initial_rho.col(b.parameters.parameter[k]);
-    }
+    for (int k = 0; k < kLanes; ++k)
+      if (const int of = b.parameters.parameter[k]; of >= 0) b.y0.col(k) = y_initial_rho.col(of);
     blocks_.push_back(std::move(b));
   }
   ydot_.setZero(states);
@@ -50,8 +49,8 @@ TangentSweep::Weights TangentSweep::integrated(const double* of_k) const {
   Weights w;
   for (int i = 0; i < rk_.dense_stages; ++i) {
     w.c += of_k[i];
-    w.v[static_cast<std::size_t>(i)] = of_k[i];
-    for (int j = 0; j < rk_.dense_stages; ++j) w.q[static_cast<std::size_t>(j)] += of_k[i] * rk_.beta(i, j);
+    w.v[at(i)] = of_k[i];
+    for (int j = 0; j < rk_.dense_stages; ++j) w.q[at(j)] += of_k[i] * rk_.beta(i, j);
   }
   return w;
 }
@@ -70,31 +69,28 @@ void TangentSweep::add_stages(const Block& b, double h, double c, const Weights&
   };
   add(h * c, 0, b.y0.data() + half);
   for (int j = first; j <= last; ++j) {
-    const std::size_t stage = static_cast<std::size_t>(j);
-    add(h * h * w.q[stage], h * w.v[stage], b.a[stage].data());
+    add(h * h * w.q[at(j)], h * w.v[at(j)], b.a[at(j)].data());
   }
   block_kernels().sum_stages(static_cast<std::size_t>(half / kLanes), terms, k, of_q, of_v, from.data(),
                              from.data() + half, to.data(), to.data() + half);
 }
 
 void TangentSweep::add_gradient(LaneRows Block::*direction, Eigen::Index objective) {
-  psi_rho_.row(objective) += g_rho_.transpose();
+  psi_rho_.row(objective) += g_.rho.transpose();
   seen_.clear();  // most objectives look at few bodies
-  for (Eigen::Index i = 0; i < g_y_.size(); ++i) {
-    if (g_y_(i) != 0) seen_.push_back(i);
-  }
+  for (Eigen::Index i = 0; i < g_.y.size(); ++i)
+    if (g_.y(i) != 0) seen_.push_back(i);
   for (const Block& b : blocks_) {
     Lanes<1> change = Lanes<1>::Zero();
-    for (const Eigen::Index i : seen_) change += g_y_(i) * (b.*direction).row(i);
-    for (int k = 0; k < kLanes; ++k) {
-      if (b.parameters.parameter[k] >= 0) psi_rho_(objective, b.parameters.parameter[k]) += change(k);
-    }
+    for (const Eigen::Index i : seen_) change += g_.y(i) * (b.*direction).row(i);
+    for (int k = 0; k < kLanes; ++k)
+      if (const int p = b.parameters.parameter[k]; p >= 0) psi_rho_(objective, p) += change(k);
   }
 }
 
 void TangentSweep::set_inside(const Step& step, double theta) {
   std::array<double, Method::kMaxStages> of_k{};
-  for (int i = 0; i < rk_.dense_stages; ++i) of_k[static_cast<std::size_t>(i)] = rk_.dense_weight(i, theta);
+  for (int i = 0; i < rk_.dense_stages; ++i) of_k[at(i)] = rk_.dense_weight(i, theta);
   const Weights w = integrated(of_k.data());
   for (Block& b : blocks_) add_stages(b, step.h, w.c, w, 0, rk_.dense_stages - 1, b.y0, b.Y);
 }
@@ -106,30 +102,27 @@ void TangentSweep::take_samples(const Step& step, std::span<const SampleEvent> e
     set_inside(step, theta);
     const double blend = projection_blend(theta);
     for (Block& b : blocks_) b.Y += blend * (b.y1 - b.y_hat);
-    StatePoint at{e.time, y_, step.angles0, motion()};
+    StatePoint here{e.time, y_, step.angles0, motion()};
     if (e.cost) {
-      set_gradient(*e.cost, at, 1);
+      g_.set(*e.cost, here, 1);
       add_gradient(&Block::Y, e.objective);
       continue;
     }
     dense_output_rate(rk_, step, theta, ydot_);
-    at.ydot = &ydot_;
-    for (const Block& b : blocks_) {
-      for (int k = 0; k < kLanes; ++k) {
-        if (b.parameters.parameter[k] >= 0) y_rho_.col(b.parameters.parameter[k]) = b.Y.col(k);
-      }
-    }
-    sampling_.observe(e.index, at, y_rho_);
+    here.ydot = &ydot_;
+    for (const Block& b : blocks_)
+      for (int k = 0; k < kLanes; ++k)
+        if (const int p = b.parameters.parameter[k]; p >= 0) y_rho_.col(p) = b.Y.col(k);
+    sampling_.observe(e.index, here, y_rho_);
   }
 }
 
 bool TangentSweep::follow_explicit(const Step& step, int i) {
   if (!linearise_stage(step, i)) return false;
-  const std::size_t stage = static_cast<std::size_t>(i);
-  const Weights& w = of_stage_[stage];
+  const Weights& w = of_stage_[at(i)];
   for (Block& b : blocks_) {
     add_stages(b, step.h, w.c, w, 0, i - 1, b.y0, b.Y);
-    dynamics_.acceleration_tangent(b.parameters, b.Y, b.a[stage]);
+    dynamics_.acceleration_tangent(b.parameters, b.Y, b.a[at(i)]);
   }
   return true;
 }
@@ -138,23 +131,22 @@ bool TangentSweep::follow_explicit(const Step& step, int i) {
 //   N x' = r_y Y*_i' + r_rho
 bool TangentSweep::follow_implicit(const Step& step, const StageGroup& g) {
   const Eigen::Index n = mechanism_.states() / 2, rows = StageEquations::count(mechanism_.data());
-  const auto of = [](int i) { return static_cast<std::size_t>(i); };
   for (int i = g.first; i <= g.last; ++i) {
     const int k = i - g.first;
     StageEquations& equations = implicit_->linearise(step, i, k);
     for (Block& b : blocks_) {
-      add_stages(b, step.h, of_stage_[of(i)].c, of_stage_[of(i)], 0, g.first - 1, b.y0, b.Y_stage[of(k)]);
-      equations.tangent(b.parameters, b.Y_stage[of(k)], r_);
+      add_stages(b, step.h, of_stage_[at(i)].c, of_stage_[at(i)], 0, g.first - 1, b.y0, b.Y_stage[at(k)]);
+      equations.tangent(b.parameters, b.Y_stage[at(k)], r_);
       b.x.middleRows(k * rows, rows) = r_;
     }
   }
   if (!implicit_->factor(step.h, g)) return false;
   for (Block& b : blocks_) {
     implicit_->solve(g, b.x);
-    for (int i = g.first; i <= g.last; ++i) b.a[of(i)] = b.x.middleRows((i - g.first) * rows, n);
+    for (int i = g.first; i <= g.last; ++i) b.a[at(i)] = b.x.middleRows((i - g.first) * rows, n);
     for (int i = g.first; i <= g.last; ++i) {
-      LaneRows& Y = b.Y_stage[of(i - g.first)];
-      add_stages(b, step.h, 0, of_stage_[of(i)], g.first, g.last, Y, Y);
+      LaneRows& Y = b.Y_stage[at(i - g.first)];
+      add_stages(b, step.h, 0, of_stage_[at(i)], g.first, g.last, Y, Y);
     }
   }
   return true;
@@ -177,7 +169,7 @@ bool TangentSweep::follow_rosenbrock(const Step& step) {
     }
   }
   for (int i = 0; i < rk_.stages; ++i) {
-    const std::size_t stage = static_cast<std::size_t>(i);
+    const std::size_t stage = at(i);
     if (i > 0 && !rosenbrock.linearise_stage(step, i)) return false;
     for (Block& b : blocks_) {
       if (i == 0) {
@@ -230,7 +222,7 @@ bool TangentSweep::follow(const Step& step, std::span<const SampleEvent> events)
     for (int i = g.first; i <= g.last; ++i) {
       if (i >= rk_.stages || rk_.b[i] == 0) continue;
       if (implicit) {
-        for (Block& b : blocks_) b.Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
+        for (Block& b : blocks_) b.Y = b.Y_stage[at(i - g.first)];
       }
       add_running_costs(step, i);
     }
@@ -258,7 +250,7 @@ bool TangentSweep::follow(const Step& step, std::span<const SampleEvent> events)
 void TangentSweep::finish(const StatePoint& end) {
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     if (!costs_[o].terminal) continue;
-    set_gradient(*costs_[o].terminal, end, 1);
+    g_.set(*costs_[o].terminal, end, 1);
     add_gradient(&Block::y0, static_cast<Eigen::Index>(o));
   }
 }

@@ -48,6 +48,18 @@ struct PointCost {
   virtual const SwitchedProgram* program() const { return nullptr; }
 };
 
+// The gradient of a cost at one point, times a weight.
+struct CostGradient {
+  Eigen::VectorXd y, rho;
+
+  // Returns the value of the cost.
+  double set(const PointCost& cost, const StatePoint& at, double weight) {
+    y.setZero();
+    rho.setZero();
+    return cost.add_gradient(at, weight, y, rho);
+  }
+};
+
 struct SampledCost {
   double time;
   std::shared_ptr<const PointCost> cost;

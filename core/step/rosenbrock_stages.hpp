@@ -17,6 +17,7 @@
 // sweeps use the same formulas, so that they are transposes of each other. f_t is taken by the formula of order 4.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "core/dynamics/dynamics.hpp"
@@ -38,7 +39,11 @@ class RosenbrockStages {
   // For the sweeps, whose step is solved: f_y at the start and the factor of I - h g f_y.
   bool factor(const Step& step);
   void solve(Eigen::Ref<Eigen::MatrixXd> x) { matrix_.solve(x, StageMatrix::kExact); }
-  void solve_transposed(Eigen::Ref<Eigen::MatrixXd> x) { matrix_.solve_transposed(x, StageMatrix::kExact); }
+  void solve_transposed(Eigen::MatrixXd& x) {  // any number of columns
+    for (Eigen::Index first = 0; first < x.cols(); first += kLanes)
+      matrix_.solve_transposed(x.middleCols(first, std::min<Eigen::Index>(kLanes, x.cols() - first)),
+                               StageMatrix::kExact);
+  }
   // Linearises the dynamics at Y_i; and at the points of D: e = k d along (h, h k_0), k = 0..4; e = sign d along w_i.
   static constexpr int kPoints = 5;
   bool linearise_stage(const Step& step, int i);
