@@ -13,7 +13,6 @@
 #include <limits>
 #include <vector>
 
-#include "core/body/state_layout.hpp"
 #include "core/cvodes/cvodes.hpp"
 #include "core/cvodes/cvodes_run.hpp"
 #include "core/run/run_ends.hpp"
@@ -34,6 +33,7 @@ class Adjoint final : public Follower {
  public:
   Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs);
 
+  bool differentiates() const override { return true; }
   // Takes a step of the forward run and keeps what the backward run needs.
   int advance(void* memory, double end, N_Vector y, double* t) override {
     return CVodeF(memory, end, y, t, CV_ONE_STEP, &checkpoints_);
@@ -80,18 +80,19 @@ class Adjoint final : public Follower {
   // The time and the results of the last evaluation.
   double t_;
   Eigen::VectorXd lambda_at_, lambda_rate_, mu_rate_;
-  Eigen::VectorXd w_, y_bar_, theta_bar_, rho_bar_;
+  CostGradient bar_;
+  Eigen::VectorXd w_, theta_bar_;
 
   Vector lambda_vector_, mu_vector_;
   LinearSolver linear_solver_;
-  NonlinearSolver fixed_point_;
+  Owner<SUNNonlinearSolver> fixed_point_;
 };
 
 Adjoint::Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs)
     : run_(run),
       settings_(settings),
       costs_(costs),
-      states_(StateLayout{run.flow().data().n}.size()),
+      states_(run.flow().states()),
       objectives_(static_cast<Eigen::Index>(costs.size())),
       active_(static_cast<Eigen::Index>(run.flow().data().active.size())),
       kept_steps_(steps_between_checkpoints(states_)),
@@ -108,9 +109,9 @@ Adjoint::Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<
   mu_.setZero(d.rho.size(), objectives_);
   for (Eigen::VectorXd* x : {&lambda_at_, &lambda_rate_}) x->setZero(states_ * objectives_);
   mu_rate_.setZero(active_ * objectives_);
-  for (Eigen::VectorXd* x : {&w_, &y_bar_}) x->setZero(states_);
+  w_.setZero(states_);
+  bar_ = {Eigen::VectorXd::Zero(states_), Eigen::VectorXd::Zero(d.rho.size())};
   theta_bar_.setZero(d.slots());
-  rho_bar_.setZero(d.rho.size());
   run.require(CVodeAdjInit(run.memory(), kept_steps_, CV_POLYNOMIAL));
 }
 
@@ -132,11 +133,9 @@ void Adjoint::take_sample(const SampleEvent& event, const StatePoint& at) {
 // lambda can become as large as the integral of a running cost's gradient. The largest value times the span would be
 // too much: it may belong to the first steps of a motion that dies out at once.
 void Adjoint::take_step(const StatePoint& at) {
-  for (const Eigen::Index o : run_.running()) {
-    y_bar_.setZero();
-    rho_bar_.setZero();
-    costs_[static_cast<std::size_t>(o)].running->add_gradient(at, 1, y_bar_, rho_bar_);
-    const double size = y_bar_.cwiseAbs().maxCoeff();
+  for (const auto& [cost, o] : run_.running()) {
+    bar_.set(*cost, at, 1);
+    const double size = bar_.y.cwiseAbs().maxCoeff();
     if (!std::isfinite(size)) continue;
     running_source_(o) += (at.t - last_time_) * std::max(size, last_size_(o));
     last_size_(o) = size;
@@ -170,26 +169,21 @@ bool Adjoint::evaluate(double t, N_Vector y, N_Vector lambda) {
   const StatePoint at = flow.point(t, values(y));
   for (Eigen::Index o = 0; o < objectives_; ++o) {
     w_ = values(lambda).segment(o * states_, states_);
-    y_bar_.setZero();
+    bar_.y.setZero();
+    bar_.rho.setZero();
     theta_bar_.setZero();
-    rho_bar_.setZero();
-    flow.dynamics().add_adjoint(w_, y_bar_, theta_bar_, rho_bar_);
-    if (const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get()) {
-      running->add_gradient(at, 1, y_bar_, rho_bar_);
-    }
-    d.add_to_rho(theta_bar_, rho_bar_);
-    lambda_rate_.segment(o * states_, states_) = -y_bar_;
-    for (Eigen::Index k = 0; k < active_; ++k) {
-      mu_rate_(o * active_ + k) = -rho_bar_(d.active[static_cast<std::size_t>(k)]);
-    }
+    flow.dynamics().add_adjoint(w_, bar_.y, theta_bar_, bar_.rho);
+    const PointCost* const running = costs_[static_cast<std::size_t>(o)].running.get();
+    if (running) running->add_gradient(at, 1, bar_.y, bar_.rho);
+    d.add_to_rho(theta_bar_, bar_.rho);
+    lambda_rate_.segment(o * states_, states_) = -bar_.y;
+    for (Eigen::Index k = 0; k < active_; ++k)
+      mu_rate_(o * active_ + k) = -bar_.rho(d.active[static_cast<std::size_t>(k)]);
   }
-  if (!lambda_rate_.allFinite() || !mu_rate_.allFinite()) {
-    t_ = std::numeric_limits<double>::quiet_NaN();
-    return false;
-  }
-  t_ = t;
+  const bool finite = lambda_rate_.allFinite() && mu_rate_.allFinite();
+  t_ = finite ? t : std::numeric_limits<double>::quiet_NaN();
   lambda_at_ = values(lambda);
-  return true;
+  return finite;
 }
 
 template <Eigen::VectorXd Adjoint::*Rate>
@@ -215,9 +209,8 @@ void Adjoint::create_backward() {
   for (Eigen::Index o = 0; o < objectives_; ++o) {
     const double atol_o = s.atol * (source_(o) > 0 ? source_(o) : 1);
     (*atol).segment(o * states_, states_).setConstant(atol_o);
-    for (Eigen::Index k = 0; k < active_; ++k) {
-      (*atol_mu)(o * active_ + k) = atol_o / parameter_size(d.rho(d.active[static_cast<std::size_t>(k)]));
-    }
+    (*atol_mu).segment(o * active_, active_) =
+        d.rho(d.active).unaryExpr([&](double rho) { return atol_o / parameter_size(rho); });
   }
   run_.require(CVodeSVtolerancesB(memory, which_, s.rtol, atol));
   run_.require(CVodeSetMaxNumStepsB(memory, which_, s.max_steps));
@@ -274,7 +267,7 @@ bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
     run_.require(CVodeGetCurrentStep(backward, &h));
     h = std::abs(h);
     if (options.progress && !options.progress(settings_.end_time)) {
-      run_.stop(SimulationStatus::stopped, fmt::format("stopped in the backward run, at t = {:.6g} s", now));
+      run_.result().stop(SimulationStatus::stopped, fmt::format("stopped in the backward run, at t = {:.6g} s", now));
       return false;
     }
   }
@@ -303,11 +296,7 @@ void Adjoint::go_back(const RunOptions& options) {
     from = to;
   }
   const std::vector<int>& active = run_.flow().data().active;
-  for (Eigen::Index o = 0; o < objectives_; ++o) {
-    for (Eigen::Index k = 0; k < active_; ++k) {
-      mu_(active[static_cast<std::size_t>(k)], o) += (*mu_vector_)(o * active_ + k);
-    }
-  }
+  for (Eigen::Index o = 0; o < objectives_; ++o) mu_(active, o) += (*mu_vector_).segment(o * active_, active_);
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ class Flow {
   SpatialDynamics& dynamics() { return dynamics_.in_space(); }
   double worst_residual() const { return dynamics_.worst_residual(); }
   const MechanismData& data() const { return mechanism_.data(); }
+  Eigen::Index states() const { return mechanism_.states(); }
   double last_time() const { return t_; }  // [s], where the equations were solved last
   long evaluations() const { return evaluations_; }
   Thrown& thrown() { return thrown_; }  // in any callback of a run on this flow

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/body/state_layout.hpp"
 #include "core/cvodes/cvodes.hpp"
 #include "core/cvodes/cvodes_run.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
@@ -44,12 +43,12 @@ class Sensitivities final : public Follower {
   const int count_;
   std::vector<ParameterBlock> blocks_;
   LaneRows direction_, change_;
-  Eigen::VectorXd y_bar_, rho_bar_;
+  CostGradient bar_;
   Eigen::MatrixXd y_rho_;
   Eigen::MatrixXd& psi_rho_;  // of the result
   VectorArray s_;
   Vector rate_;  // dy/dt at a sample
-  NonlinearSolver fixed_point_;
+  Owner<SUNNonlinearSolver> fixed_point_;
 };
 
 Sensitivities::Sensitivities(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs,
@@ -61,27 +60,24 @@ Sensitivities::Sensitivities(ForwardRun& run, const SimulationSettings& settings
       count_(static_cast<int>(active_.size())),
       blocks_(parameter_blocks(run.flow().data())),
       psi_rho_(run.result().psi_rho),
-      s_(std::max(1, count_), StateLayout{run.flow().data().n}.size(), run.context()),
-      rate_(StateLayout{run.flow().data().n}.size(), run.context()) {
-  const MechanismData& d = run.flow().data();
-  const Eigen::Index states = StateLayout{d.n}.size();
+      s_(std::max(1, count_), run.flow().states(), run.context()),
+      rate_(run.flow().states(), run.context()) {
+  const Eigen::Index states = run.flow().states(), parameters = run.flow().data().rho.size();
   direction_.setZero(states, kLanes);
   change_.setZero(states, kLanes);
-  y_bar_.setZero(states);
-  rho_bar_.setZero(d.rho.size());
-  y_rho_.setZero(states, d.rho.size());
-  psi_rho_.setZero(static_cast<Eigen::Index>(costs.size()), d.rho.size());
+  bar_ = {Eigen::VectorXd(states), Eigen::VectorXd(parameters)};
+  y_rho_.setZero(states, parameters);
+  psi_rho_.setZero(static_cast<Eigen::Index>(costs.size()), parameters);
   if (count_ > 0 && run.result().ok()) register_with(settings);
 }
 
 void Sensitivities::register_with(const SimulationSettings& settings) {
-  const MechanismData& d = run_.flow().data();
   const Eigen::MatrixXd y0_rho = run_.assembly().tangent();
   std::vector<double> size, atol;
   for (int k = 0; k < count_; ++k) {
-    const int parameter = active_[static_cast<std::size_t>(k)];
+    const int parameter = active_[at(k)];
     s_.at(k) = y0_rho.col(parameter);
-    size.push_back(parameter_size(d.rho(parameter)));
+    size.push_back(parameter_size(run_.flow().data().rho(parameter)));
     atol.push_back(settings.integrator.atol / size.back());
   }
   void* memory = run_.memory();
@@ -94,9 +90,9 @@ void Sensitivities::register_with(const SimulationSettings& settings) {
   }
   if (run_.running().empty()) return;
   const Eigen::Index quadratures = static_cast<Eigen::Index>(run_.running().size());
-  const VectorArray none(count_, quadratures, run_.context()), tolerances(count_, quadratures, run_.context());
+  VectorArray none(count_, quadratures, run_.context()), tolerances(count_, quadratures, run_.context());
   const Eigen::VectorXd atol_g = run_.quadrature_atol();
-  for (int k = 0; k < count_; ++k) tolerances.at(k) = atol_g / size[static_cast<std::size_t>(k)];
+  for (int k = 0; k < count_; ++k) tolerances.at(k) = atol_g / size[at(k)];
   run_.require(CVodeQuadSensInit(memory, g, none));
   run_.require(CVodeQuadSensSVtolerances(memory, settings.integrator.rtol, tolerances));
   run_.require(CVodeSetQuadSensErrCon(memory, SUNTRUE));
@@ -125,12 +121,9 @@ int Sensitivities::g(int count, realtype t, N_Vector y, N_Vector* s, N_Vector, N
   return self.run_.flow().thrown().keep([&] {
     const StatePoint at = self.run_.flow().point(t, values(y));
     for (std::size_t q = 0; q < self.run_.running().size(); ++q) {
-      const PointCost& cost = *self.costs_[static_cast<std::size_t>(self.run_.running()[q])].running;
-      self.y_bar_.setZero();
-      self.rho_bar_.setZero();
-      cost.add_gradient(at, 1, self.y_bar_, self.rho_bar_);
+      self.bar_.set(*self.run_.running()[q].cost, at, 1);
       for (int k = 0; k < count; ++k) {
-        const double rate = self.y_bar_.dot(values(s[k])) + self.rho_bar_(self.active_[static_cast<std::size_t>(k)]);
+        const double rate = self.bar_.y.dot(values(s[k])) + self.bar_.rho(self.active_[mbsopt::at(k)]);
         values(gsdot[k])(static_cast<Eigen::Index>(q)) = self.run_.bounded(rate, q);
       }
     }
@@ -140,10 +133,8 @@ int Sensitivities::g(int count, realtype t, N_Vector y, N_Vector* s, N_Vector, N
 
 void Sensitivities::add_cost(const PointCost& cost, const StatePoint& at, Eigen::Index objective) {
   if (count_ == 0) return;
-  y_bar_.setZero();
-  rho_bar_.setZero();
-  cost.add_gradient(at, 1, y_bar_, rho_bar_);
-  psi_rho_.row(objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
+  bar_.set(cost, at, 1);
+  psi_rho_.row(objective) += bar_.rho.transpose() + bar_.y.transpose() * y_rho_;
 }
 
 void Sensitivities::set_y_rho() {
@@ -178,15 +169,15 @@ void Sensitivities::finish() {
   double t = end.t;
   run_.require(CVodeGetSens(run_.memory(), &t, s_));
   set_y_rho();
-  for (std::size_t o = 0; o < costs_.size(); ++o) {
+  for (std::size_t o = 0; o < costs_.size(); ++o)
     if (costs_[o].terminal) add_cost(*costs_[o].terminal, end, static_cast<Eigen::Index>(o));
-  }
   if (run_.running().empty()) return;
-  const VectorArray integrals(count_, static_cast<Eigen::Index>(run_.running().size()), run_.context());
+  VectorArray integrals(count_, static_cast<Eigen::Index>(run_.running().size()), run_.context());
   run_.require(CVodeGetQuadSens(run_.memory(), &t, integrals));
   for (std::size_t k = 0; k < active_.size(); ++k) {
     for (std::size_t q = 0; q < run_.running().size(); ++q) {
-      psi_rho_(run_.running()[q], active_[k]) += integrals.at(static_cast<int>(k))(static_cast<Eigen::Index>(q));
+      psi_rho_(run_.running()[q].objective, active_[k]) +=
+          integrals.at(static_cast<int>(k))(static_cast<Eigen::Index>(q));
     }
   }
 }

@@ -5,6 +5,9 @@
 #include <cvodes/cvodes.h>
 #include <nvector/nvector_serial.h>
 #include <sundials/sundials_context.h>
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_matrix.h>
+#include <sundials/sundials_nonlinearsolver.h>
 
 #include <Eigen/Core>
 #include <exception>
@@ -12,21 +15,35 @@
 #include <new>
 #include <type_traits>
 #include <utility>
+#include <vector>
+
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt::cvodes {
+
+// Releases each kind of object.
+struct Release {
+  void operator()(SUNContext context) const { SUNContext_Free(&context); }
+  void operator()(N_Vector vector) const { N_VDestroy(vector); }
+  void operator()(void* memory) const { CVodeFree(&memory); }  // of one integrator
+  void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFree(solver); }
+  void operator()(SUNLinearSolver solver) const { SUNLinSolFreeEmpty(solver); }
+  void operator()(SUNMatrix matrix) const { SUNMatFreeEmpty(matrix); }
+};
+template <class Object>
+using Owner = std::unique_ptr<std::remove_pointer_t<Object>, Release>;
 
 class Context {
  public:
   Context() {
-    if (SUNContext_Create(nullptr, &context_) != 0) throw std::bad_alloc();
+    SUNContext context = nullptr;
+    if (SUNContext_Create(nullptr, &context) != 0) throw std::bad_alloc();
+    context_.reset(context);
   }
-  ~Context() { SUNContext_Free(&context_); }
-  Context(const Context&) = delete;
-  Context& operator=(const Context&) = delete;
-  operator SUNContext() const { return context_; }
+  operator SUNContext() const { return context_.get(); }
 
  private:
-  SUNContext context_ = nullptr;
+  Owner<SUNContext> context_;
 };
 
 // The numbers of a SUNDIALS vector.
@@ -45,45 +62,28 @@ class Vector {
   Vector(Eigen::Index size, const Context& context) : vector_(N_VNew_Serial(size, context)) {
     if (!vector_) throw std::bad_alloc();
     vector_->ops->nvclone = &clone_of_zeros;
-    values(vector_).setZero();
+    values(*this).setZero();
   }
-  Vector(Vector&& other) noexcept : vector_(std::exchange(other.vector_, nullptr)) {}
-  Vector& operator=(Vector&&) = delete;
-  ~Vector() { N_VDestroy(vector_); }
-  operator N_Vector() const { return vector_; }
-  Eigen::Map<Eigen::VectorXd> operator*() const { return values(vector_); }
+  operator N_Vector() const { return vector_.get(); }
+  Eigen::Map<Eigen::VectorXd> operator*() const { return values(*this); }
 
  private:
-  N_Vector vector_;
+  Owner<N_Vector> vector_;
 };
 
 // An array of vectors of the same size, as SUNDIALS' functions of sensitivities require.
 class VectorArray {
  public:
-  VectorArray(int count, Eigen::Index size, const Context& context)
-      : count_(count), vectors_(N_VCloneVectorArray(count, Vector(size, context))) {
-    if (!vectors_) throw std::bad_alloc();
+  VectorArray(int count, Eigen::Index size, const Context& context) {
+    for (int i = 0; i < count; ++i) handles_.push_back(vectors_.emplace_back(size, context));
   }
-  VectorArray(const VectorArray&) = delete;
-  VectorArray& operator=(const VectorArray&) = delete;
-  ~VectorArray() { N_VDestroyVectorArray(vectors_, count_); }
-  operator N_Vector*() const { return vectors_; }
-  Eigen::Map<Eigen::VectorXd> at(int i) const { return values(vectors_[i]); }
+  operator N_Vector*() { return handles_.data(); }
+  Eigen::Map<Eigen::VectorXd> at(int i) const { return *vectors_[mbsopt::at(i)]; }
 
  private:
-  int count_;
-  N_Vector* vectors_;
+  std::vector<Vector> vectors_;
+  std::vector<N_Vector> handles_;
 };
-
-struct FreeMemory {
-  void operator()(void* memory) const { CVodeFree(&memory); }
-};
-using Memory = std::unique_ptr<void, FreeMemory>;  // of one integrator
-
-struct FreeNonlinearSolver {
-  void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFree(solver); }
-};
-using NonlinearSolver = std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeNonlinearSolver>;
 
 // An exception of a user's cost or force must not unwind through CVODES, which is C. A callback keeps the exception and
 // reports a failure; the caller of CVODES then throws it.

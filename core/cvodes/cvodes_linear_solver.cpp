@@ -2,14 +2,12 @@
 
 #include <cvodes/cvodes_ls.h>
 
-#include "core/body/state_layout.hpp"
-
 namespace mbsopt::cvodes {
 
 LinearSolver::LinearSolver(Flow& flow, const Context& context)
     : flow_(flow),
       matrix_(flow.data(), flow.dynamics()),
-      y_(StateLayout{flow.data().n}.size()),
+      y_(flow.states()),
       solver_(SUNLinSolNewEmpty(context)),
       handle_(SUNMatNewEmpty(context)) {
   if (!solver_ || !handle_) throw std::bad_alloc();
@@ -23,19 +21,16 @@ LinearSolver::LinearSolver(Flow& flow, const Context& context)
   handle_->ops->getid = [](SUNMatrix) { return SUNMATRIX_CUSTOM; };
 }
 
-bool LinearSolver::linearise(double t, const Flow::Numbers& y) {
-  if (!flow_.linearise(t, y)) return false;
-  y_ = y;
-  matrix_.linearise(t, y_, flow_.angles_at(t), flow_.ydot().tail(y_.size() / 2), flow_.dynamics().lambda());
-  return true;
-}
-
 int LinearSolver::set_up(double t, const Flow::Numbers& y, bool keep_jacobian, booleantype* jacobian_is_new,
                          double gamma) {
   constexpr int kRetry = 1;  // CVODES tries a smaller step
   *jacobian_is_new = keep_jacobian ? SUNFALSE : SUNTRUE;
   return flow_.thrown().keep([&] {
-    if (!keep_jacobian && !linearise(t, y)) return kRetry;
+    if (!keep_jacobian) {
+      if (!flow_.linearise(t, y)) return kRetry;
+      y_ = y;
+      matrix_.linearise(t, y_, flow_.angles_at(t), flow_.ydot().tail(y_.size() / 2), flow_.dynamics().lambda());
+    }
     return matrix_.factor(gamma) ? 0 : kRetry;
   });
 }
@@ -46,17 +41,13 @@ int LinearSolver::solve(N_Vector x, N_Vector b) {
   out = values(b);
   for (Eigen::Index first = 0; first < out.size(); first += y_.size()) {
     ++solves_;
-    if (backward_) {
-      matrix_.solve_transposed(out.segment(first, y_.size()), kRefinements);
-    } else {
-      matrix_.solve(out.segment(first, y_.size()), kRefinements);
-    }
+    auto of_objective = out.segment(first, y_.size());
+    backward_ ? matrix_.solve_transposed(of_objective, kRefinements) : matrix_.solve(of_objective, kRefinements);
   }
   return 0;
 }
 
 bool LinearSolver::attach(void* memory) {
-  backward_ = false;
   const CVLsLinSysFn assemble = [](realtype t, N_Vector y, N_Vector, SUNMatrix A, booleantype keep, booleantype* is_new,
                                    realtype gamma, void*, N_Vector, N_Vector,
                                    N_Vector) { return of(A).set_up(t, values(y), keep != SUNFALSE, is_new, gamma); };

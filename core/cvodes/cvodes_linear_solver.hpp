@@ -4,12 +4,6 @@
 // each objective's part of the vector.
 #pragma once
 
-#include <sundials/sundials_linearsolver.h>
-#include <sundials/sundials_matrix.h>
-
-#include <memory>
-#include <type_traits>
-
 #include "core/cvodes/cvodes_flow.hpp"
 #include "core/step/shifted_system.hpp"
 
@@ -27,22 +21,15 @@ class LinearSolver {
   long solves() const { return solves_; }
 
  private:
-  struct FreeSolver {
-    void operator()(SUNLinearSolver s) const { SUNLinSolFreeEmpty(s); }
-  };
-  struct FreeMatrix {
-    void operator()(SUNMatrix m) const { SUNMatFreeEmpty(m); }
-  };
   static LinearSolver& of(SUNMatrix A) { return *static_cast<LinearSolver*>(A->content); }
-  bool linearise(double t, const Flow::Numbers& y);
   int set_up(double t, const Flow::Numbers& y, bool keep_jacobian, booleantype* jacobian_is_new, double gamma);
   int solve(N_Vector x, N_Vector b);
 
   Flow& flow_;
   ShiftedSystem matrix_;
   Eigen::VectorXd y_;
-  std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeSolver> solver_;
-  std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix> handle_;
+  Owner<SUNLinearSolver> solver_;
+  Owner<SUNMatrix> handle_;
   bool backward_ = false;
   long solves_ = 0;
 };

@@ -12,7 +12,6 @@
 
 #include "core/cvodes/cvodes.hpp"
 #include "core/run/run_ends.hpp"
-#include "core/sensor/body_at.hpp"
 #include "core/start/model_warnings.hpp"
 #include "core/step/step_control.hpp"
 #include "core/step/step_failure.hpp"
@@ -65,23 +64,17 @@ ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& set
       y_sample_(mechanism.states(), context_),
       linear_solver_(flow_, context_) {
   y_now_ = assembly_.result().y;
-  for (std::size_t o = 0; o < costs.size(); ++o) {
-    if (costs[o].running) running_.push_back(static_cast<Eigen::Index>(o));
-  }
+  for (std::size_t o = 0; o < costs.size(); ++o)
+    if (costs[o].running) running_.push_back({costs[o].running.get(), static_cast<Eigen::Index>(o)});
   left_range_.assign(running_.size(), false);
   if (!result_.ok()) return;
   flow_.start(settings.start_time, assembly_.result().angles);
   *y_ = assembly_.result().y;
   if (!flow_.evaluate(settings.start_time, *y_) || !massless_bodies(mechanism, assembly_).empty()) {
-    stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), settings.start_time));
+    result_.stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), settings.start_time));
     return;
   }
   set_up();
-}
-
-void ForwardRun::stop(SimulationStatus status, std::string message) {
-  result_.status = status;
-  result_.message = std::move(message);
 }
 
 void ForwardRun::require(int flag) const {
@@ -133,7 +126,7 @@ Eigen::VectorXd ForwardRun::quadrature_atol() {
   Eigen::VectorXd atol(static_cast<Eigen::Index>(running_.size()));
   const StatePoint start{settings_.start_time, assembly_.result().y, assembly_.result().angles, flow_.motion()};
   for (std::size_t k = 0; k < running_.size(); ++k) {
-    const double rate = std::abs(costs_[static_cast<std::size_t>(running_[k])].running->value(start));
+    const double rate = std::abs(running_[k].cost->value(start));
     const double size = rate < kLargestRate ? rate * (settings_.end_time - settings_.start_time) : 0;
     atol(static_cast<Eigen::Index>(k)) = std::max(settings_.integrator.atol, settings_.integrator.rtol * size);
   }
@@ -166,8 +159,7 @@ int ForwardRun::g(realtype t, N_Vector y, N_Vector gdot, void* self) {
   return run.flow_.thrown().keep([&] {
     const StatePoint at = run.flow_.point(t, values(y));
     for (std::size_t k = 0; k < run.running_.size(); ++k) {
-      const PointCost& cost = *run.costs_[static_cast<std::size_t>(run.running_[k])].running;
-      values(gdot)(static_cast<Eigen::Index>(k)) = run.bounded(cost.value(at), k);
+      values(gdot)(static_cast<Eigen::Index>(k)) = run.bounded(run.running_[k].cost->value(at), k);
     }
     return kOk;
   });
@@ -180,26 +172,30 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
   const auto is = [&](std::initializer_list<int> flags) { return std::ranges::find(flags, flag) != flags.end(); };
   if (is({CV_RHSFUNC_FAIL, CV_FIRST_RHSFUNC_ERR, CV_REPTD_RHSFUNC_ERR, CV_UNREC_RHSFUNC_ERR, CV_SRHSFUNC_FAIL,
           CV_FIRST_SRHSFUNC_ERR, CV_REPTD_SRHSFUNC_ERR, CV_UNREC_SRHSFUNC_ERR}))
-    return stop(SimulationStatus::not_finite, not_computable(of_what, t));
-  if (flag == CV_TOO_MUCH_ACC) return stop(SimulationStatus::step_too_small, too_few_digits(settings_.integrator, t));
+    return result_.stop(SimulationStatus::not_finite, not_computable(of_what, t));
+  if (flag == CV_TOO_MUCH_ACC)
+    return result_.stop(SimulationStatus::step_too_small, too_few_digits(settings_.integrator, t));
   if (flag == CV_TOO_MUCH_WORK)
-    return stop(
+    return result_.stop(
         SimulationStatus::too_many_steps,
         fmt::format("more than {} steps were needed; stopped at t = {:.6g} s. Loosen rtol and atol, raise "
                     "simulation.integrator.max_steps{}",
                     settings_.integrator.max_steps, t,
                     is_stiff_method(settings_) ? "" : ", or take cvodes_bdf where springs or dampers are very stiff"));
   if (!is({CV_ERR_FAILURE, CV_CONV_FAILURE, CV_TOO_CLOSE, CV_LSETUP_FAIL}))
-    return stop(SimulationStatus::step_too_small, fmt::format("CVODES stopped at t = {:.6g} s: {}", t, last_words_));
+    return result_.stop(SimulationStatus::step_too_small,
+                        fmt::format("CVODES stopped at t = {:.6g} s: {}", t, last_words_));
   // CVODES gives up if h is the smallest step, within its own tolerance of 1e-6.
   if (const auto min_step = settings_.integrator.options.min_step; min_step && h <= *min_step * (1 + 1e-6))
-    return stop(SimulationStatus::step_too_small,
-                below_min_step(flag == CV_ERR_FAILURE ? StepOutcome::rejected : StepOutcome::unsolved, t, *min_step));
-  stop(SimulationStatus::step_too_small,
-       fmt::format("no step beyond t = {:.6g} s is small enough for the tolerances (the last one tried was {:.3g} "
-                   "s). Look for {}a singular position, a spring of zero length or a law that is not smooth near "
-                   "this time; CVODES does not project onto the constraints, a Runge-Kutta method may pass it",
-                   t, h, about_quadratures()));
+    return result_.stop(
+        SimulationStatus::step_too_small,
+        below_min_step(flag == CV_ERR_FAILURE ? StepOutcome::rejected : StepOutcome::unsolved, t, *min_step));
+  result_.stop(
+      SimulationStatus::step_too_small,
+      fmt::format("no step beyond t = {:.6g} s is small enough for the tolerances (the last one tried was {:.3g} "
+                  "s). Look for {}a singular position, a spring of zero length or a law that is not smooth near "
+                  "this time; CVODES does not project onto the constraints, a Runge-Kutta method may pass it",
+                  t, h, about_quadratures()));
 }
 
 // Names the running costs if their integrals demanded smaller steps.
@@ -208,8 +204,8 @@ std::string ForwardRun::about_quadratures() const {
   if (!running_.empty()) CVodeGetQuadNumErrTestFails(memory(), &fails);
   if (fails == 0) return {};
   std::string names;
-  for (const Eigen::Index o : running_) {
-    const std::string& name = costs_[static_cast<std::size_t>(o)].name;
+  for (const Running& r : running_) {
+    const std::string& name = costs_[static_cast<std::size_t>(r.objective)].name;
     if (!name.empty()) names += (names.empty() ? " of objective '" : ", '") + name + "'";
   }
   return "a pole or jump of the running cost" + names + ", ";
@@ -217,16 +213,14 @@ std::string ForwardRun::about_quadratures() const {
 
 // The branch is the nearest one, so a joint must not turn by half a turn in one step.
 bool ForwardRun::step_is_followed(double h) {
-  for (const JointAngle& a : mechanism_.data().angles) {
-    const double rate = std::abs(a.rate(body_at(y_now_, a.body1).frame, body_at(y_now_, a.body2).frame));
-    if (rate * h <= 3) continue;
-    stop(SimulationStatus::step_too_large,
-         fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; more "
-                     "than half a turn cannot be followed: set simulation.integrator.max_step",
-                     result_.last_good_time, rate * h, h));
-    return false;
-  }
-  return true;
+  const double turn = h * fastest_followed_rate(mechanism_.data(), y_now_);
+  if (turn <= 3) return true;
+  result_.stop(
+      SimulationStatus::step_too_large,
+      fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; more "
+                  "than half a turn cannot be followed: set simulation.integrator.max_step",
+                  result_.last_good_time, turn, h));
+  return false;
 }
 
 void ForwardRun::take_samples(SampleSchedule& schedule, double t) {
@@ -294,7 +288,7 @@ void ForwardRun::go(std::span<const double> observed, Follower& follower) {
   const double end = settings_.end_time;
   double t = settings_.start_time, t1 = t;
   SampleSchedule schedule(costs_, observed, end);
-  RunGuard guard(mechanism_.data(), *violations_, end, settings_.integrator.max_steps);
+  RunGuard guard(mechanism_.data(), *violations_, settings_, result_.statistics);
   ObserverOf lengths([&](const SeenStep& step) {
     return through_zero_length(mechanism_.data(), step.from.t, step.from.y, step.to.t, step.to.y);
   });
@@ -307,12 +301,13 @@ void ForwardRun::go(std::span<const double> observed, Follower& follower) {
   std::optional<JumpWatch> jumps;
   std::vector<StepObserver*> observers{&guard};
   if (follower.differentiates())
-    observers.insert(observers.end(), {&lengths, &jumps.emplace(mechanism_, settings_, costs_, flow_.motion())});
+    observers.insert(observers.end(), {&lengths, &jumps.emplace(mechanism_, settings_, costs_, flow_.motion(),
+                                                                result_.statistics.jumps)});
   observers.push_back(&samples);
   // CVODES sees the rates at the ends of a step.
   PulseWatch pulses(mechanism_, costs_, t, end, settings_.integrator.rtol, {{0, 0.5, 0.5}, {1, 0.5, -0.5}});
   std::string words = objection_to_start(observers, {t, y_now_, assembly_.result().angles});
-  if (!words.empty()) stop(SimulationStatus::not_credible, std::move(words));
+  if (!words.empty()) result_.stop(SimulationStatus::not_credible, std::move(words));
   while (t < end && result_.ok()) {
     require(CVodeSetStopTime(memory(), stop_before_pulse(t, pulses)));
     if (!advance(t, t1)) break;
@@ -320,20 +315,18 @@ void ForwardRun::go(std::span<const double> observed, Follower& follower) {
     y_now_ = *y_;
     if (!step_is_followed(t1 - t)) break;
     ++result_.statistics.steps;
-    result_.steps.times.push_back(t);
-    result_.steps.sizes.push_back(t1 - t);
+    result_.steps.add(t, t1 - t);
     flow_.accept(t1, y_now_);
     const StatePoint before{t, y_before_, flow_.angles_at(t)}, here{t1, y_now_, flow_.angles_at(t1), flow_.motion()};
     words = objection_to({before, here, flow_.worst_residual()}, observers);
     if (words.empty()) {
       report_step(here, options_, result_);
     } else {
-      stop(SimulationStatus::not_credible, std::move(words));
+      result_.stop(SimulationStatus::not_credible, std::move(words));
     }
   }
   count_steps();
   result_.y_end = y_now_;
-  for (StepObserver* const observer : observers) observer->add_to(result_.statistics);
   if (!result_.ok()) return;
   add_integrals();
   add_terminal_costs(costs_, this->end(), result_);
@@ -345,7 +338,7 @@ void ForwardRun::add_integrals() {
   Vector integrals(static_cast<Eigen::Index>(running_.size()), context_);
   require(CVodeGetQuad(memory(), &t, integrals));
   for (std::size_t k = 0; k < running_.size(); ++k) {
-    result_.psi(running_[k]) +=
+    result_.psi(running_[k].objective) +=
         left_range_[k] ? std::numeric_limits<double>::infinity() : (*integrals)(static_cast<Eigen::Index>(k));
   }
 }
@@ -384,16 +377,8 @@ SimulationSettings with_cvodes(SimulationSettings settings) {
 
 SimulationResult cvodes_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
                                  std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options) {
-  struct Observed final : cvodes::Follower {
-    explicit Observed(const Sampling& s) : sampling(s) {}
-    bool differentiates() const override { return false; }
-    void take_sample(const SampleEvent& event, const StatePoint& at) override {
-      if (!event.cost && sampling.observe) sampling.observe(event.index, at);
-    }
-    const Sampling& sampling;
-  };
   cvodes::ForwardRun run(mechanism, settings, costs, options);
-  Observed observed(sampling);
+  cvodes::Follower observed(sampling);
   run.go(sampling.times, observed);
   return run.finish();
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,16 +29,21 @@ inline constexpr int kOk = 0, kTryASmallerStep = 1;
 // The size by which tolerances of a derivative are divided.
 inline double parameter_size(double rho) { return rho == 0 ? 1 : std::abs(rho); }
 
-// A follower takes the steps and samples of a forward run, and may carry derivatives along them.
+// A follower takes the steps and samples of a forward run: it observes the samples, or carries derivatives along.
 struct Follower {
+  explicit Follower(const Sampling& sampling = {}) : observe(sampling.observe) {}
   virtual ~Follower() = default;
-  virtual bool differentiates() const { return true; }
+  virtual bool differentiates() const { return false; }
   // Takes one step towards end.
   virtual int advance(void* memory, double end, N_Vector y, double* t) { return CVode(memory, end, y, t, CV_ONE_STEP); }
-  virtual void take_sample(const SampleEvent& event, const StatePoint& at) = 0;  // of a cost, or an observation
+  virtual void take_sample(const SampleEvent& event, const StatePoint& at) {  // of a cost, or an observation
+    if (!event.cost && observe) observe(event.index, at);
+  }
   virtual void take_step(const StatePoint&) {}
   // Adds those of the derivatives.
   virtual void count(void* /*memory*/, long& /*failed_error_tests*/, long& /*iterations*/) const {}
+
+  std::function<void(std::size_t index, const StatePoint& at)> observe;
 };
 
 class ForwardRun {
@@ -53,8 +59,12 @@ class ForwardRun {
   void* memory() const { return memory_.get(); }
   Flow& flow() { return flow_; }
   SimulationResult& result() { return result_; }
-  const std::vector<Eigen::Index>& running() const { return running_; }  // objectives with a running cost
-  Eigen::VectorXd quadrature_atol();                                     // of each of these
+  struct Running {
+    const PointCost* cost;
+    Eigen::Index objective;
+  };
+  const std::vector<Running>& running() const { return running_; }
+  Eigen::VectorXd quadrature_atol();  // of each of these
 
   // From assembly to the end, with values of all costs; result() says how it ended.
   void go(std::span<const double> observed, Follower& follower);
@@ -66,7 +76,6 @@ class ForwardRun {
   StatePoint end();  // of the run
 
   void require(int flag) const;  // throws std::runtime_error where CVODES refused what is always right
-  void stop(SimulationStatus status, std::string message);
   // The meaning of a negative return value, in words.
   void stop_for(int flag, double t, const char* of_what);
   std::string about_quadratures() const;
@@ -93,7 +102,7 @@ class ForwardRun {
   ComponentTolerances tolerances_;
   Flow flow_;
   std::unique_ptr<Projector> violations_;
-  std::vector<Eigen::Index> running_;
+  std::vector<Running> running_;
   std::vector<bool> left_range_;
   std::string last_words_;  // of CVODES
   Follower* follower_ = nullptr;
@@ -102,8 +111,8 @@ class ForwardRun {
   Context context_;
   Vector y_, y_sample_;
   LinearSolver linear_solver_;
-  NonlinearSolver fixed_point_;
-  Memory memory_;
+  Owner<SUNNonlinearSolver> fixed_point_;
+  Owner<void*> memory_;
 };
 
 }  // namespace mbsopt::cvodes

@@ -90,24 +90,17 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
       events_({}, settings.start_time, settings.end_time),
       shortest_(1e-9 * std::max(1e-3, settings.end_time - settings.start_time)),
       h_(settings.end_time - settings.start_time),
-      absolute_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.size()))) {
+      result_(result_at_start(start, settings.start_time, costs.size())) {
   if (!motion && mechanism.data().needs_motion) motion = &motion_.emplace(mechanism, settings.formulation);
   if (motion) continued_.emplace(*motion, [this](double t) { return window_at(t); });
-  result_.psi.setZero(static_cast<Eigen::Index>(costs.size()));
-  result_.last_good_time = settings.start_time;
-  result_.y_initial = start.result().y;
   result_.statistics.solved = true;
-  for (std::size_t o = 0; o < costs.size(); ++o) {
-    if (costs[o].running) running_.push_back({costs[o].running.get(), static_cast<Eigen::Index>(o)});
-  }
+  for (std::size_t o = 0; o < costs.size(); ++o)
+    if (costs[o].running) running_.push_back({&costs[o], static_cast<Eigen::Index>(o)});
   std::vector<double> events = settings.events;
   if (!running_.empty()) nodes_.resize(kNodes);
   if (!running_.empty() && !frozen_)
     instants_ = timed_instants(mechanism, costs, settings.start_time, settings.end_time, shortest_, events);
   events_ = EventTimes(events, settings.start_time, settings.end_time);
-  g_.resize(running_.size() * kNodes);
-  integrals_.resize(running_.size());
-  errors_.resize(running_.size());
   path_.start(settings.start_time, settings.end_time, start.result().y, start.result().angles);
   path_.set_watch([&d = mechanism_.data(), differentiated](const DrivenState& from, const DrivenState& to) {
     std::string words = past_half_turn(d, from.y, to.t, to.y);
@@ -115,16 +108,11 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
   });
 }
 
-void DrivenRun::stop(SimulationStatus status, const std::string& message) {
-  result_.status = status;
-  result_.message = message;
-}
-
 bool DrivenRun::go_to(double t) { return path_.go_to(t, shortest_, kMostStepsOfStretch); }
 
 void DrivenRun::stop_where_it_ends() {
-  if (!path_.objection().empty()) return stop(SimulationStatus::not_credible, path_.objection());
-  stop(SimulationStatus::step_too_small, why_stuck(mechanism_, settings_, path_.state().t, path_.state().y));
+  if (!path_.objection().empty()) return result_.stop(SimulationStatus::not_credible, path_.objection());
+  result_.stop(SimulationStatus::step_too_small, why_stuck(mechanism_, settings_, path_.state().t, path_.state().y));
 }
 
 SimulationResult DrivenRun::finish() {
@@ -141,14 +129,15 @@ void DrivenRun::go(const Take& take) {
   if (!take_terminal_costs(take)) return stop_at_singular_matrix();
   if (result_.psi.allFinite()) return;
   const std::string singular = in_words(result_.statistics.singular, {});
-  stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi) + (singular.empty() ? "" : "; " + singular));
+  result_.stop(SimulationStatus::not_finite,
+               not_finite_costs(costs_, result_.psi) + (singular.empty() ? "" : "; " + singular));
 }
 
 void DrivenRun::go_through_panels(const Take& take) {
   const double end = settings_.end_time;
   if (is_too_fast()) return;
   if (differentiated_ && !frozen_) {
-    jumps_.emplace(mechanism_, settings_, costs_, continued());
+    jumps_.emplace(mechanism_, settings_, costs_, continued(), result_.statistics.jumps);
     jumps_->begin(point());
   }
   std::span<const SampleEvent> at_start = schedule_.take(path_.state().t);
@@ -164,7 +153,7 @@ void DrivenRun::go_through_panels(const Take& take) {
     }
     if (outcome == Panel::stuck) return stop_where_it_ends();
     if (path_.steps() > settings_.integrator.max_steps) {
-      return stop(
+      return result_.stop(
           SimulationStatus::too_many_steps,
           fmt::format("more than {} positions were needed until t = {:.6g} s (integrator.max_steps). Look for a "
                       "pole of the law of a drive; is it in rad and s?",
@@ -172,7 +161,7 @@ void DrivenRun::go_through_panels(const Take& take) {
     }
     double resume = events_.reached(t1) ? events_.resume_time() : t1;
     if (std::string jump = frozen_ ? std::string() : law_jumps_.between(t, resume); !jump.empty())
-      return stop(SimulationStatus::not_credible, std::move(jump));
+      return result_.stop(SimulationStatus::not_credible, std::move(jump));
     if (!take_panel(t1, take)) return stop_at_singular_matrix();
     end_panel(t, t1);
     if (jumps_) jumps_->look_at({point_of(from_), point()});
@@ -182,7 +171,6 @@ void DrivenRun::go_through_panels(const Take& take) {
     if (frozen_) resume = begun.size() < frozen_->times.size() ? frozen_->times[begun.size()] : t1;
     if (!go_to(resume)) return stop_where_it_ends();
   }
-  if (jumps_) jumps_->add_to(result_.statistics);
   add_quadrature_errors();
 }
 
@@ -191,10 +179,11 @@ bool DrivenRun::is_too_fast() {
   const long most = settings_.integrator.max_steps;
   const double t = path_.state().t;
   if (!(settings_.end_time - t > static_cast<double>(most) * path_.step_limit())) return false;
-  stop(SimulationStatus::too_many_steps,
-       fmt::format("at t = {:.6g} s the drives turn a body so fast that the motion until {:.6g} s takes more steps "
-                   "than simulation.integrator.max_steps, {}. Is the law in rad and s?",
-                   t, settings_.end_time, most));
+  result_.stop(
+      SimulationStatus::too_many_steps,
+      fmt::format("at t = {:.6g} s the drives turn a body so fast that the motion until {:.6g} s takes more steps "
+                  "than simulation.integrator.max_steps, {}. Is the law in rad and s?",
+                  t, settings_.end_time, most));
   return true;
 }
 
@@ -227,18 +216,17 @@ void DrivenRun::try_shorter(Panel outcome, double t1) {
 
 void DrivenRun::stop_at_singular_matrix() {
   if (!result_.ok()) return;  // the path ended before
-  stop(SimulationStatus::not_finite,
-       fmt::format("the derivatives met a matrix that cannot be factored at t = {:.6g} s: a singular position?",
-                   path_.state().t));
+  result_.stop(SimulationStatus::not_finite,
+               fmt::format("the derivatives met a matrix that cannot be factored at t = {:.6g} s: a singular position?",
+                           path_.state().t));
 }
 
 // The shortest panels were accepted without a test: they may hold an integrable singularity.
 void DrivenRun::add_quadrature_errors() {
-  for (std::size_t r = 0; r < running_.size(); ++r) {
-    const Cost& cost = costs_[static_cast<std::size_t>(running_[r].objective)];
-    const double of_size = absolute_(running_[r].objective);
-    QuadratureError& worst = cost.is_extreme ? result_.statistics.extreme_quadrature : result_.statistics.quadrature;
-    if (errors_[r].of_run > worst.error * of_size) worst = {errors_[r].of_run / of_size, cost.name, errors_[r].worst_t};
+  SimulationStatistics& s = result_.statistics;
+  for (const Integral& r : running_) {
+    QuadratureError& worst = r.of->is_extreme ? s.extreme_quadrature : s.quadrature;
+    if (r.error > worst.error * r.absolute) worst = {r.error / r.absolute, r.of->name, r.worst_t};
   }
 }
 
@@ -253,32 +241,29 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     if (!go_to(t + kronrod_rule().nodes[k] * h)) return Panel::stuck;
     nodes_[k] = path_.state();
-    for (std::size_t r = 0; r < running_.size(); ++r) g_[r * kNodes + k] = value_of(running_[r], point_of(nodes_[k]));
+    for (Integral& r : running_) r.g[k] = noted(r.objective, r.of->running->value(point_of(nodes_[k])), nodes_[k].t);
   }
   if (!go_to(t1)) return Panel::stuck;
-  for (std::size_t r = 0; r < running_.size(); ++r) {
-    std::array<double, kNodes> g;
+  for (Integral& r : running_) {
+    std::array<double, kNodes> g = r.g;
     double shortest = shortest_;
     for (std::size_t k = 0; k < kNodes; ++k) {
-      g[k] = g_[r * kNodes + k];
-      if (is_left_out(g[k], nodes_[k].t)) {
-        g[k] = 0;
-        shortest = window_at(nodes_[k].t)->half;
-      }
+      if (!is_left_out(g[k], nodes_[k].t)) continue;
+      g[k] = 0;
+      shortest = window_at(nodes_[k].t)->half;
     }
-    integrals_[r] = integrate_panel(g, h);
+    r.panel = integrate_panel(g, h);
     if (frozen_ || h <= shortest) continue;
-    if (integrals_[r].error > allowed_error(r, h)) return Panel::refused;  // the end of the run reports NaN
+    if (r.panel.error > allowed_error(r, h)) return Panel::refused;  // the end of the run reports NaN
   }
   return !frozen_ && hides_a_peak(h) ? Panel::refused : Panel::accepted;
 }
 
-double DrivenRun::allowed_error(std::size_t r, double h) const {
+double DrivenRun::allowed_error(const Integral& r, double h) const {
   const IntegratorSettings& s = settings_.integrator;
   // Exponentials of smooth extremes have any size, so atol does not apply to them.
-  const Cost& cost = costs_[static_cast<std::size_t>(running_[r].objective)];
-  const double of_panel = s.rtol * integrals_[r].absolute + (cost.is_extreme ? 0 : s.atol * h);
-  return std::max(of_panel, kPartOfRun * s.rtol * (absolute_(running_[r].objective) + integrals_[r].absolute));
+  const double of_panel = s.rtol * r.panel.absolute + (r.of->is_extreme ? 0 : s.atol * h);
+  return std::max(of_panel, kPartOfRun * s.rtol * (r.absolute + r.panel.absolute));
 }
 
 // A peak as wide as the distance of the instants, which differs by D from the polynomial there, adds D times the
@@ -289,8 +274,8 @@ bool DrivenRun::hides_a_peak(double h) {
   const auto& c = kronrod_rule().nodes;
   std::vector<boost::math::barycentric_rational<double>> P;  // of the highest order: polynomials through all nodes
   std::vector<double> sizes;                                 // of the running costs
-  for (std::size_t r = 0; r < running_.size(); ++r) {
-    std::vector<double> x(c.begin(), c.end()), g(&g_[r * kNodes], &g_[r * kNodes] + kNodes);
+  for (const Integral& r : running_) {
+    std::vector<double> x(c.begin(), c.end()), g(r.g.begin(), r.g.end());
     sizes.push_back(std::abs(*std::ranges::max_element(g, {}, [](double v) { return std::abs(v); })));
     P.emplace_back(std::move(x), std::move(g), kNodes - 1);
   }
@@ -302,33 +287,32 @@ bool DrivenRun::hides_a_peak(double h) {
       hermite(a.y, b.y, gap, j / parts, y_);
       const StatePoint between{t, y_, a.angles, continued()};
       for (std::size_t r = 0; r < running_.size(); ++r) {
-        const double g = running_[r].cost->value(between), D = std::abs(g - P[r]((t - from_.t) / h));
-        if (D > kPeak * std::max(sizes[r], std::abs(g)) && D * gap / parts > allowed_error(r, h)) return true;
+        const double g = running_[r].of->running->value(between), D = std::abs(g - P[r]((t - from_.t) / h));
+        if (D > kPeak * std::max(sizes[r], std::abs(g)) && D * gap / parts > allowed_error(running_[r], h)) return true;
       }
     }
   }
   return false;
 }
 
-double DrivenRun::value_of(const DrivenTerm& term, const StatePoint& at) {
-  const double g = term.cost->value(at);
-  note_left_out(term, g, at.t);
-  return g;
-}
-
-void DrivenRun::note_left_out(const DrivenTerm& term, double value, double t) {
+double DrivenRun::noted(Eigen::Index objective, double value, double t) {
   if (is_left_out(value, t))
-    singular_at(t).note("objective '" + costs_[static_cast<std::size_t>(term.objective)].name + "'");
+    singular_at(t).note("objective '" + costs_[static_cast<std::size_t>(objective)].name + "'");
+  return value;
 }
 
 void DrivenRun::count(const DrivenTerm& term, double value, double t) {
-  if (!term.counts) return;
-  note_left_out(term, value, t);
-  result_.psi(term.objective) += value;
+  if (term.counts) result_.psi(term.objective) += noted(term.objective, value, t);
 }
 
 SingularPosition& DrivenRun::singular_at(double t) {
-  return singular_position(mechanism_, *window_at(t), result_.statistics.singular);
+  std::vector<SingularPosition>& known = result_.statistics.singular;
+  const SingularWindow& w = *window_at(t);
+  const auto same = std::ranges::find(known, w.t, &SingularPosition::t);
+  if (same != known.end()) return *same;
+  known.push_back(singular_position(mechanism_, w.t, w.state_at(w.t).y));
+  known.back().half = w.half;
+  return known.back();
 }
 
 // Notes that a state which is asked for cannot be continued smoothly past a singular position.
@@ -348,21 +332,18 @@ bool DrivenRun::take_panel(double t1, const Take& take) {
     path_.start(nodes_[k]);
     note_uncertain();
     at_instant_.clear();
-    for (std::size_t r = 0; r < running_.size(); ++r) {
-      running_[r].weight = (t1 - from_.t) * kronrod_rule().kronrod[k];
-      if (!is_left_out(g_[r * kNodes + k], nodes_[k].t)) at_instant_.push_back(running_[r]);
-    }
+    const double weight = (t1 - from_.t) * kronrod_rule().kronrod[k];
+    for (const Integral& r : running_)
+      if (!is_left_out(r.g[k], nodes_[k].t)) at_instant_.push_back({r.of->running.get(), r.objective, weight});
     if (!take(point(), at_instant_)) return false;
   }
-  for (std::size_t r = 0; r < running_.size(); ++r) {
-    const PanelIntegral& I = integrals_[r];
-    const Eigen::Index o = running_[r].objective;
-    result_.psi(o) += I.value;
-    absolute_(o) += I.absolute;
-    errors_[r].of_run += I.error;
-    if (I.error > errors_[r].worst) {
-      errors_[r].worst = I.error;
-      errors_[r].worst_t = from_.t;
+  for (Integral& r : running_) {
+    result_.psi(r.objective) += r.panel.value;
+    r.absolute += r.panel.absolute;
+    r.error += r.panel.error;
+    if (r.panel.error > r.worst) {
+      r.worst = r.panel.error;
+      r.worst_t = from_.t;
     }
   }
   if (!take_events_until(INFINITY, events, take)) return false;
@@ -408,18 +389,13 @@ bool DrivenRun::take_terminal_costs(const Take& take) {
 }
 
 void DrivenRun::end_panel(double t0, double t1) {
-  SimulationStatistics& s = result_.statistics;
-  ++s.steps;
-  result_.steps.times.push_back(t0);
-  result_.steps.sizes.push_back(t1 - t0);
+  ++result_.statistics.steps;
+  result_.steps.add(t0, t1 - t0);
   result_.last_good_time = t1;
   double relative = 0;
-  s.max_position_violation = std::max(s.max_position_violation, path_.position_violation(&relative));
-  s.relative_position_violation = std::max(s.relative_position_violation, relative);
-  s.max_velocity_violation = std::max(s.max_velocity_violation, path_.velocity_violation());
+  const double position = path_.position_violation(&relative);
   const Energy e = energy(mechanism_.data(), path_.state().y, path_.state().angles);
-  s.energy_final = e.kinetic + e.potential;
-  s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));
+  note_state(position, relative, path_.velocity_violation(), e, result_.statistics);
 }
 
 }  // namespace mbsopt

@@ -11,6 +11,7 @@
 // The panels are the steps of the result: given again (RunOptions::frozen), they make psi a smooth function of rho.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -67,15 +68,19 @@ class DrivenRun {
 
  private:
   enum class Panel { accepted, refused, stuck };
-  struct PanelErrors {  // of an integral: the sum, the largest of a panel, and when that begins
-    double of_run = 0, worst = 0, worst_t = 0;
+  struct Integral {  // of a running cost
+    const Cost* of;
+    Eigen::Index objective;
+    std::array<double, kNodes> g{};                          // at the nodes of the panel
+    PanelIntegral panel{};                                   // over it
+    double absolute = 0, error = 0, worst = 0, worst_t = 0;  // of |g| so far; of its panels, the largest, and when
   };
   void go_through_panels(const Take& take);
   bool is_too_fast();
   double next_end();
   void try_shorter(Panel outcome, double t1);
   Panel try_panel(double t1);
-  double allowed_error(std::size_t r, double h) const;
+  double allowed_error(const Integral& integral, double h) const;
   bool hides_a_peak(double h);
   double largest_panel() const;
   bool take_panel(double t1, const Take& take);
@@ -84,13 +89,11 @@ class DrivenRun {
   bool take_here(std::span<const DrivenTerm> terms, const Take& take);  // at the state of the path
   bool take_terminal_costs(const Take& take);
   void end_panel(double t0, double t1);
-  void stop(SimulationStatus status, const std::string& message);
   void stop_at_singular_matrix();
   bool go_to(double t);
   void stop_where_it_ends();  // with the reason why the path cannot continue
   StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, continued()}; }
-  double value_of(const DrivenTerm& term, const StatePoint& at);
-  void note_left_out(const DrivenTerm& term, double value, double t);
+  double noted(Eigen::Index objective, double value, double t);  // the value, after a note if it is left out
   void note_uncertain();
   bool is_left_out(double g, double t) const { return std::isnan(g) && window_at(t); }
 
@@ -105,21 +108,17 @@ class DrivenRun {
   SampleSchedule schedule_;
   LawJumps law_jumps_;
   const bool differentiated_;
-  EventTimes events_;                // those of the file, and jumps of functions of time
-  std::optional<JumpWatch> jumps_;   // of runs with derivatives
-  const double shortest_;            // step or panel [s]
-  double h_;                         // of the next panel [s]
-  double ended_at_ = -INFINITY;      // the time at which a panel was stuck last
-  std::vector<DrivenTerm> running_;  // of one node
+  EventTimes events_;               // those of the file, and jumps of functions of time
+  std::optional<JumpWatch> jumps_;  // of runs with derivatives
+  const double shortest_;           // step or panel [s]
+  double h_;                        // of the next panel [s]
+  double ended_at_ = -INFINITY;     // the time at which a panel was stuck last
+  std::vector<Integral> running_;
   std::vector<DrivenTerm> at_instant_;
   std::vector<DrivenState> nodes_;  // of the panel; none without running costs
   Eigen::VectorXd y_;               // between two nodes
   std::vector<double> instants_;    // at which functions of time change
   DrivenState from_;                // the start of the panel
-  std::vector<double> g_;           // running cost x node
-  Eigen::VectorXd absolute_;        // integral of |g| so far, per cost
-  std::vector<PanelIntegral> integrals_;
-  std::vector<PanelErrors> errors_;
   SimulationResult result_;
 };
 

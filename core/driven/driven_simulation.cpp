@@ -40,9 +40,8 @@ class DrivenDerivatives {
         projector_(run.projector()),
         unmoved_(projector_.solution()),
         blocks_(parameter_blocks(data_)),
-        y_bar_(Eigen::VectorXd::Zero(mechanism.states())),
-        rho_bar_(Eigen::VectorXd::Zero(data_.rho.size())),
-        y0_bar_(y_bar_),
+        bar_{Eigen::VectorXd::Zero(mechanism.states()), Eigen::VectorXd::Zero(data_.rho.size())},
+        y0_bar_(bar_.y),
         y_rho_(Eigen::MatrixXd::Zero(mechanism.states(), data_.rho.size())) {
     y0_dir_.setZero(mechanism.states(), kLanes);
     direction_ = y0_dir_;
@@ -52,11 +51,11 @@ class DrivenDerivatives {
   // is singular.
   bool set_y_rho(const StatePoint& at, bool velocities) {
     const SingularWindow* const w = run_.window_at(at.t);
-    if (!w) return linearise(at) && find_y_rho(velocities);
+    if (!w) return find_y_rho(at, velocities);
     tangents_.clear();
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(y_rho_.rows(), y_rho_.cols());
     const bool regular = w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
-      if (!linearise({node.t, node.y, node.angles}) || !find_y_rho(velocities)) return false;
+      if (!find_y_rho({node.t, node.y, node.angles}, velocities)) return false;
       tangents_.push_back(y_rho_);
       sum += weight * y_rho_;
       return true;
@@ -71,7 +70,7 @@ class DrivenDerivatives {
     constexpr double kPole = 1e-2;      // of the roughness, far above that of smooth motions
     constexpr double kRounding = 1e-9;  // of the positions: a derivative that moves them less consists of rounding
     for (const SingularWindow& w : run_.windows()) {
-      if (w.nodes.empty() || data_.active.empty() || !set_y_rho({w.t, y_bar_, y_bar_}, false)) continue;
+      if (w.nodes.empty() || data_.active.empty() || !set_y_rho({w.t, bar_.y, bar_.y}, false)) continue;
       Eigen::MatrixXd q_rho(y_rho_.rows() / 2, SingularWindow::kNodes);
       for (const int p : data_.active) {
         for (Eigen::Index k = 0; k < q_rho.cols(); ++k)
@@ -85,24 +84,22 @@ class DrivenDerivatives {
   const Eigen::MatrixXd& y_rho() const { return y_rho_; }
   // psi_rho += weight d(cost)/d(rho) with y_rho known
   void add_forward(const DrivenTerm& term, const StatePoint& at, Eigen::MatrixXd& psi_rho) {
-    y_bar_.setZero();
-    rho_bar_.setZero();
-    run_.count(term, term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_), at.t);
-    psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
+    run_.count(term, bar_.set(*term.cost, at, term.weight), at.t);
+    psi_rho.row(term.objective) += bar_.rho.transpose() + bar_.y.transpose() * y_rho_;
   }
   // Adds the same for all terms of one objective, to the gradients in the fields and parameters.
   void add_backward(std::span<const DrivenTerm> terms, const StatePoint& at, Eigen::VectorXd& theta_bar,
                     Eigen::VectorXd& rho_bar) {
     const SingularWindow* const w = run_.window_at(at.t);
     ContinuedMotion* const motion = run_.continued();
-    if (w && motion) motion->y_bars.assign(SingularWindow::kNodes, Eigen::VectorXd::Zero(y_bar_.size()));
-    y_bar_.setZero();
+    if (w && motion) motion->y_bars.assign(SingularWindow::kNodes, Eigen::VectorXd::Zero(bar_.y.size()));
+    bar_.y.setZero();
     for (const DrivenTerm& term : terms)
-      run_.count(term, term.cost->add_gradient(at, term.weight, y_bar_, rho_bar), at.t);
-    if (!w) return projector_.add_adjoint(y_bar_, y0_bar_, theta_bar, rho_bar);
+      run_.count(term, term.cost->add_gradient(at, term.weight, bar_.y, rho_bar), at.t);
+    if (!w) return projector_.add_adjoint(bar_.y, y0_bar_, theta_bar, rho_bar);
     std::size_t k = 0;
     w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
-      Eigen::VectorXd y_bar = weight * y_bar_;
+      Eigen::VectorXd y_bar = weight * bar_.y;
       if (motion) y_bar += motion->y_bars[k++];
       linearise({node.t, node.y, node.angles});
       projector_.add_adjoint(y_bar, y0_bar_, theta_bar, rho_bar);
@@ -111,16 +108,16 @@ class DrivenDerivatives {
   }
 
  private:
-  bool find_y_rho(bool velocities) {
+  bool find_y_rho(const StatePoint& at, bool velocities) {
+    if (!linearise(at)) return false;
     const Eigen::Index rows = velocities ? y_rho_.rows() : y_rho_.rows() / 2;
     for (const ParameterBlock& b : blocks_) {
       if (velocities)
         projector_.tangent(b, y0_dir_, direction_);
       else
         projector_.position_tangent(b, y0_dir_, direction_);
-      for (int k = 0; k < kLanes; ++k) {
+      for (int k = 0; k < kLanes; ++k)
         if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]).head(rows) = direction_.col(k).head(rows);
-      }
     }
     return true;
   }
@@ -131,7 +128,7 @@ class DrivenDerivatives {
   std::vector<Eigen::MatrixXd> tangents_;  // at the nodes of a window
   const ProjectionSolution unmoved_;
   std::vector<ParameterBlock> blocks_;
-  Eigen::VectorXd y_bar_, rho_bar_;
+  CostGradient bar_;
   Eigen::VectorXd y0_bar_;  // of the state that is projected, which only rounding reaches
   Eigen::MatrixXd y_rho_;
   LaneRows y0_dir_, direction_;  // y0_dir_ is zero: the projected state does not depend on rho

@@ -78,11 +78,11 @@ SimulationResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
   const StatePoint first = run.point();
   if (start.summary().degrees_of_freedom > 0 &&
       singular_position(mechanism, first.t, first.y, kDrivenRankThreshold).rank_lost > 0) {
-    failed.status = SimulationStatus::assembly_failed;
-    failed.message = fmt::format(
-        "the drives leave {}. Kinematics needs every motion driven, by drives or by a condition on a sensor "
-        "(initial.conditions) for each. If the start is a singular position, begin beside it",
-        freedoms_in_words(mechanism, start, times.front()));
+    failed.stop(
+        SimulationStatus::assembly_failed,
+        fmt::format("the drives leave {}. Kinematics needs every motion driven, by drives or by a condition on a "
+                    "sensor (initial.conditions) for each. If the start is a singular position, begin beside it",
+                    freedoms_in_words(mechanism, start, times.front())));
     return failed;
   }
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {

@@ -34,15 +34,6 @@ SingularPosition singular_position(const Mechanism& mechanism, double t, const E
   return s;
 }
 
-SingularPosition& singular_position(const Mechanism& mechanism, const SingularWindow& w,
-                                    std::vector<SingularPosition>& known) {
-  const auto same = std::ranges::find(known, w.t, &SingularPosition::t);
-  if (same != known.end()) return *same;
-  known.push_back(singular_position(mechanism, w.t, w.state_at(w.t).y));
-  known.back().half = w.half;
-  return known.back();
-}
-
 std::string why_stuck(const Mechanism& mechanism, const SimulationSettings& settings, double t,
                       const Eigen::VectorXd& y) {
   // The interval over which a jump is measured; it is long against the rounding of times.

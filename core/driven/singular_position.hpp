@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/settings.hpp"
@@ -16,9 +15,6 @@ inline constexpr double kDigitsOfInstant = 1e-3;      // the same at an instant 
 
 SingularPosition singular_position(const Mechanism& mechanism, double t, const Eigen::VectorXd& y,
                                    double threshold = kDigitsOfInstant);
-// The entry of a window among the known ones, to which it is added if it is new.
-SingularPosition& singular_position(const Mechanism& mechanism, const SingularWindow& window,
-                                    std::vector<SingularPosition>& known);
 
 // The reason why the positions cannot be continued from a state at t, in words: a jump of a law, or the position.
 std::string why_stuck(const Mechanism& mechanism, const SimulationSettings& settings, double t,

@@ -57,16 +57,16 @@ void ForwardRun::go(std::span<const double> observed, Observe observe, const Run
   });
   std::optional<JumpWatch> jumps;
   std::vector<StepObserver*> observers{this};
-  if (follow && judges_) observers.push_back(&jumps.emplace(mechanism_, settings_, costs_, motion()));
+  if (follow && judges_)
+    observers.push_back(&jumps.emplace(mechanism_, settings_, costs_, motion(), result_.statistics.jumps));
   if (follow) observers.push_back(&follower);
   StepAttempt attempt(mechanism_, settings_, method_);
   RungeKuttaRun(attempt, costs_, options, result_).go(assembly_.result().y, assembly_.result().angles, observers);
+  quadrature_.add_to(result_.statistics);
   angles_end_ = attempt.step().angles0;
-  if (result_.ok() && !followed) {
-    result_.status = SimulationStatus::not_finite;
-    result_.message =
-        "the derivatives met a matrix that cannot be factored: a massless direction that no joint covers?";
-  }
+  if (result_.ok() && !followed)
+    result_.stop(SimulationStatus::not_finite,
+                 "the derivatives met a matrix that cannot be factored: a massless direction that no joint covers?");
   if (result_.ok()) add_terminal_costs(costs_, end(), result_);
 }
 

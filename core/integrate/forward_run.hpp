@@ -45,7 +45,6 @@ class ForwardRun : private StepObserver {
   // The values of costs and samples of a step.
   bool reads_inside(double t1) const override { return schedule_->due(t1); }
   std::string look_at(const SeenStep& step) override;
-  void add_to(SimulationStatistics& statistics) override { quadrature_.add_to(statistics); }
   void add_running_costs(const Step& step);
   void sample(const Step& step);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }

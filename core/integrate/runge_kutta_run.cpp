@@ -9,9 +9,7 @@
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/run/run_ends.hpp"
 #include "core/run/timed_laws.hpp"
-#include "core/sensor/body_at.hpp"
 #include "core/start/model_warnings.hpp"
-#include "core/watch/weak_joints.hpp"
 
 namespace mbsopt {
 namespace {
@@ -49,9 +47,9 @@ RungeKuttaRun::RungeKuttaRun(StepAttempt& attempt, std::span<const Cost> costs, 
       controller_(attempt.method().error_order, integrator_.options),
       events_(settings_.events, settings_.start_time, end_),
       kink_control_({}, settings_.start_time, end_),
-      guard_(mechanism_.data(), attempt.projector(), end_, integrator_.max_steps, !frozen_),
+      guard_(mechanism_.data(), attempt.projector(), settings_, result.statistics, !frozen_),
       penalty_(mechanism_.data()),
-      stiffness_(attempt.method(), mechanism_.states()) {
+      stiffness_(attempt.method(), mechanism_.states(), result.statistics) {
   if (adaptive_ && attempt.responses() > 0) passage_.emplace(attempt.method(), attempt.responses());
   if (frozen_) return;
   pulses_.emplace(mechanism_, costs, settings_.start_time, end_, integrator_.rtol, pulse_nodes(attempt.method()));
@@ -67,23 +65,21 @@ void RungeKuttaRun::go(const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
     observers_.push_back(&penalty_);
   observers_.insert(observers_.end(), {&stiffness_, &guard_});
   observers_.insert(observers_.end(), observers.begin(), observers.end());
-  if (begin(y, angles)) {
-    choose_first_size();
-    while (goes_on() && choose_size()) {
-      const StepOutcome outcome = try_step();
-      if (outcome != StepOutcome::accepted) {
-        reject(outcome);
-        continue;
-      }
-      if (is_split() || is_better_placed_elsewhere()) continue;
-      note_step();
-      if (!result_.ok()) break;
-      choose_next_size();
-      advance();
+  if (!begin(y, angles)) return;
+  choose_first_size();
+  while (goes_on() && choose_size()) {
+    const StepOutcome outcome = try_step();
+    if (outcome != StepOutcome::accepted) {
+      reject(outcome);
+      continue;
     }
-    add_statistics();
+    if (is_split() || is_better_placed_elsewhere()) continue;
+    note_step();
+    if (!result_.ok()) break;
+    choose_next_size();
+    advance();
   }
-  for (StepObserver* const observer : observers_) observer->add_to(result_.statistics);
+  add_statistics();
 }
 
 // Never beyond the event; an adaptive run does not leave a tiny last step.
@@ -91,14 +87,6 @@ double RungeKuttaRun::size_to(double event) const {
   const double left = event - step_.t;
   if (h_ >= left * (1 - 1e-9)) return left;
   return adaptive_ && 2 * h_ > left ? 0.5 * left : h_;
-}
-
-double RungeKuttaRun::fastest_tracked_rate() const {
-  double fastest = 0;
-  for (const JointAngle& a : mechanism_.data().angles) {
-    fastest = std::max(fastest, std::abs(a.rate(body_at(step_.y0, a.body1).frame, body_at(step_.y0, a.body2).frame)));
-  }
-  return fastest;
 }
 
 double RungeKuttaRun::limited(double h) const {
@@ -113,12 +101,13 @@ bool RungeKuttaRun::begin(const Eigen::VectorXd& y, const Eigen::VectorXd& angle
   const double t = frozen_ && frozen_index_ < last_ ? frozen_->times[frozen_index_] : settings_.start_time;
   result_.last_good_time = t;
   if (std::string words = objection_to_start(observers_, {t, y, angles}); !words.empty()) {
-    stop(SimulationStatus::not_credible, std::move(words));
+    result_.stop(SimulationStatus::not_credible, std::move(words));
     return false;
   }
   // Rounding errors can hide a singular mass matrix, and give accelerations without meaning.
   if (!attempt_.begin(t, y, angles) || (!frozen_ && !massless_bodies(mechanism_.data(), y).empty())) {
-    stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), t) + about_alpha(settings_.formulation));
+    result_.stop(SimulationStatus::not_finite,
+                 start_failure(mechanism_.data(), t) + about_alpha(settings_.formulation));
     return false;
   }
   // A guard on which scenes are taken to be planar: what was assembled in space satisfies the planar equations.
@@ -126,10 +115,10 @@ bool RungeKuttaRun::begin(const Eigen::VectorXd& y, const Eigen::VectorXd& angle
     Projector& projector = attempt_.projector();
     const double unmet = std::max(projector.position_violation(t, angles, y), projector.velocity_violation(t, y));
     if (unmet > 1e-6 * (1 + y.cwiseAbs().maxCoeff())) {
-      stop(SimulationStatus::not_credible,
-           fmt::format("the start does not satisfy the equations of the planar model, by {:.3g}: set "
-                       "simulation.model to \"spatial\"",
-                       unmet));
+      result_.stop(SimulationStatus::not_credible,
+                   fmt::format("the start does not satisfy the equations of the planar model, by {:.3g}: set "
+                               "simulation.model to \"spatial\"",
+                               unmet));
       return false;
     }
   }
@@ -143,26 +132,23 @@ std::string RungeKuttaRun::tolerances_or(std::string message) const {
 }
 
 void RungeKuttaRun::choose_first_size() {
-  h_ = adaptive_ ? attempt_.first_size(span_) : integrator_.step.value_or(span_);
-  if (integrator_.max_step) h_ = std::min(h_, *integrator_.max_step);
-  if (adaptive_) h_ = std::max(h_, integrator_.options.min_step.value_or(0));
-  longest_ = h_;
+  longest_ = h_ = limited(adaptive_ ? attempt_.first_size(span_) : integrator_.step.value_or(span_));
   if (!(h_ > 0)) {
-    stop(SimulationStatus::step_too_small,
-         tolerances_or(step_failure(StepOutcome::rejected, step_.t, h_, adaptive_, settings_.formulation)));
+    result_.stop(SimulationStatus::step_too_small,
+                 tolerances_or(step_failure(StepOutcome::rejected, step_.t, h_, adaptive_, settings_.formulation)));
   }
   if (adaptive_ && h_ * kMostSteps * kMostSteps < span_) {  // steps may still grow, but not so much
-    stop(SimulationStatus::step_too_small, tolerances_or(too_long_run(span_, h_)));
+    result_.stop(SimulationStatus::step_too_small, tolerances_or(too_long_run(span_, h_)));
   }
 }
 
 bool RungeKuttaRun::choose_size() {
   if (result_.statistics.steps + result_.statistics.rejected >= integrator_.max_steps) {
-    stop(SimulationStatus::too_many_steps,
-         tolerances_or(fmt::format("more than {} steps were needed; stopped at t = {:.6g} s with steps of "
-                                   "{:.3g} s. Loosen rtol and atol, raise simulation.integrator.max_steps, or "
-                                   "look for very stiff springs or dampers",
-                                   integrator_.max_steps, step_.t, h_)));
+    result_.stop(SimulationStatus::too_many_steps,
+                 tolerances_or(fmt::format("more than {} steps were needed; stopped at t = {:.6g} s with steps of "
+                                           "{:.3g} s. Loosen rtol and atol, raise simulation.integrator.max_steps, or "
+                                           "look for very stiff springs or dampers",
+                                           integrator_.max_steps, step_.t, h_)));
     return false;
   }
   if (frozen_) {
@@ -171,7 +157,7 @@ bool RungeKuttaRun::choose_size() {
     return true;
   }
   if (split_) return true;
-  const double rate = fastest_tracked_rate(), to_event = events_.stop_after(step_.t);
+  const double rate = fastest_followed_rate(mechanism_.data(), step_.y0), to_event = events_.stop_after(step_.t);
   if (adaptive_ && rate * h_ > 2)
     h_ = rounded_step(2 / rate);  // an angle is followed over turns only when steps are below half a turn
   asked_ = size_to(to_event);
@@ -183,10 +169,10 @@ bool RungeKuttaRun::choose_size() {
     if (placed != h_) h_ = rounded_step(placed, kPartsOfPlaced);
   }
   if (adaptive_ || !(rate * h_ > 3)) return true;
-  stop(SimulationStatus::step_too_large,
-       fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; "
-                   "more than half a turn cannot be followed: use a smaller simulation.integrator.step",
-                   step_.t, rate * h_, h_));
+  result_.stop(SimulationStatus::step_too_large,
+               fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; "
+                           "more than half a turn cannot be followed: use a smaller simulation.integrator.step",
+                           step_.t, rate * h_, h_));
   return false;
 }
 
@@ -253,10 +239,10 @@ void RungeKuttaRun::reject(StepOutcome outcome) {
   attempt_.reject();
   split_.reset();
   if (!adaptive_) {
-    stop(outcome == StepOutcome::unsolved          ? SimulationStatus::not_solved
-         : outcome == StepOutcome::off_constraints ? SimulationStatus::step_too_large
-                                                   : SimulationStatus::not_finite,
-         step_failure(outcome, step_.t, h_, adaptive_, settings_.formulation));
+    result_.stop(outcome == StepOutcome::unsolved          ? SimulationStatus::not_solved
+                 : outcome == StepOutcome::off_constraints ? SimulationStatus::step_too_large
+                                                           : SimulationStatus::not_finite,
+                 step_failure(outcome, step_.t, h_, adaptive_, settings_.formulation));
     return;
   }
   ++(outcome == StepOutcome::rejected          ? count.rejections.error_test
@@ -268,9 +254,9 @@ void RungeKuttaRun::reject(StepOutcome outcome) {
     const std::string objection = weak_joints_objection(error_of_weak_joints(
         mechanism_, settings_.formulation, attempt_.worst_of_rejected(), step_.t, step_.y0, step_.angles0));
     if (!objection.empty()) {
-      stop(SimulationStatus::not_credible,
-           fmt::format("of {} steps to t = {:.6g} s {} were rejected: {}", count.steps + count.rejected, step_.t,
-                       count.rejected, objection));
+      result_.stop(SimulationStatus::not_credible,
+                   fmt::format("of {} steps to t = {:.6g} s {} were rejected: {}", count.steps + count.rejected,
+                               step_.t, count.rejected, objection));
       return;
     }
   }
@@ -286,14 +272,14 @@ void RungeKuttaRun::reject(StepOutcome outcome) {
   if (min_step && h_ < *min_step) {
     h_ = *min_step;
     if (tried > h_) return;
-    stop(SimulationStatus::step_too_small, tolerances_or(below_min_step(outcome, step_.t, *min_step)));
+    result_.stop(SimulationStatus::step_too_small, tolerances_or(below_min_step(outcome, step_.t, *min_step)));
     return;
   }
   if (h_ >= 1e-14 * std::max(span_, std::abs(step_.t))) return;
-  stop(SimulationStatus::step_too_small,
-       tolerances_or(longest_ * kMostSteps < span_
-                         ? too_long_run(span_, longest_)
-                         : step_failure(outcome, step_.t, h_, adaptive_, settings_.formulation)));
+  result_.stop(SimulationStatus::step_too_small,
+               tolerances_or(longest_ * kMostSteps < span_
+                                 ? too_long_run(span_, longest_)
+                                 : step_failure(outcome, step_.t, h_, adaptive_, settings_.formulation)));
 }
 
 // Notes an accepted step, and shows it to all that look at the run.
@@ -304,13 +290,10 @@ void RungeKuttaRun::note_step() {
     s.projected_error = attempt_.projected_error();
     s.projected_error_time = step_.t;
   }
-  if (!is_part_) {
-    result_.steps.times.push_back(step_.t);
-    result_.steps.sizes.push_back(h_);
-  }
+  if (!is_part_) result_.steps.add(step_.t, h_);
   longest_ = std::max(longest_, h_);
   std::string words = objection_to(seen(), observers_);
-  if (!words.empty()) stop(SimulationStatus::not_credible, std::move(words));
+  if (!words.empty()) result_.stop(SimulationStatus::not_credible, std::move(words));
 }
 
 void RungeKuttaRun::choose_next_size() {
@@ -363,6 +346,8 @@ void RungeKuttaRun::add_statistics() {
   result_.y_end = step_.y0;
   add_residuals(mechanism_, settings_.formulation, attempt_.worst_residual(), {step_.t, step_.y0, step_.angles0},
                 result_.statistics);
+  double& worst = result_.statistics.max_acceleration_residual;
+  worst = std::max(worst, penalty_.share());
   attempt_.add_to(result_.statistics);
 }
 

@@ -19,11 +19,11 @@
 #include "core/step/kink_times.hpp"
 #include "core/step/singular_passage.hpp"
 #include "core/step/step_control.hpp"
-#include "core/watch/penalty_watch.hpp"
 #include "core/watch/pulse_watch.hpp"
 #include "core/watch/run_guard.hpp"
 #include "core/watch/step_observer.hpp"
 #include "core/watch/stiffness.hpp"
+#include "core/watch/weak_joints.hpp"
 
 namespace mbsopt {
 
@@ -52,7 +52,6 @@ class RungeKuttaRun {
   void add_statistics();
   std::string tolerances_or(std::string message) const;
   double size_to(double event) const;
-  double fastest_tracked_rate() const;
   double limited(double h) const;
   SeenStep seen() const;
 
@@ -61,10 +60,6 @@ class RungeKuttaRun {
                    : t1 >= end_ - kink_control_.gap();
   }
   bool goes_on() const { return result_.ok() && (frozen_ ? frozen_index_ < last_ : step_.t < end_); }
-  void stop(SimulationStatus status, std::string message) {
-    result_.status = status;
-    result_.message = std::move(message);
-  }
 
   StepAttempt& attempt_;
   const Step& step_;  // of the attempt

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/run/cost.hpp"
@@ -15,6 +16,11 @@ namespace mbsopt {
 struct StepSequence {
   std::vector<double> times, sizes;
   bool to_the_end = true;  // the last step is the run's last, not one before it
+
+  void add(double t, double h) {
+    times.push_back(t);
+    sizes.push_back(h);
+  }
 };
 
 // The estimated error of an integral relative to the integral of |integrand|, with the objective and the time of most
@@ -29,11 +35,11 @@ struct QuadratureError {
 struct Jump {
   enum class Owner { force, drive, objective };  // of a drive: its law's second derivative
   Owner of = Owner::force;
-  int index = 0;                // of the force or drive in the scene
-  std::string objective;        // its name
-  double size = 0, t = 0;       // [unit of the law, s]
-  std::vector<int> parameters;  // active ones that the instant depends on directly
-  bool motion = false;          // and whether it depends on the motion
+  int index = 0;                  // of the force or drive in the scene
+  std::string objective{};        // its name
+  double size = 0, t = 0;         // [unit of the law, s]
+  std::vector<int> parameters{};  // active ones that the instant depends on directly
+  bool motion = false;            // and whether it depends on the motion
 };
 
 // A pulse of a function of time that a step passes over (pulse_watch.hpp).
@@ -109,6 +115,10 @@ struct SimulationResult {
   SimulationStatistics statistics;
   StepSequence steps;
   bool ok() const { return status == SimulationStatus::ok; }
+  void stop(SimulationStatus why, std::string words) {
+    status = why;
+    message = std::move(words);
+  }
 };
 
 // Observes states at given times (ascending, within the simulated span) through dense output. It never forces a step.

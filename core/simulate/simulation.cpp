@@ -97,10 +97,11 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
   result.statistics.recomputed_steps = checkpoints.recomputed_steps();
   result.statistics.factorisations += again.statistics.factorisations;  // of all replays: one attempt counts them
   if (!swept) {
-    result.status = stopped ? SimulationStatus::stopped : SimulationStatus::not_finite;
-    result.message =
-        stopped ? fmt::format("stopped in the backward run, at t = {:.6g} s", t_back)
-                : fmt::format("the adjoint met a matrix that cannot be factored in the step at t = {:.6g} s", t_back);
+    if (stopped)
+      result.stop(SimulationStatus::stopped, fmt::format("stopped in the backward run, at t = {:.6g} s", t_back));
+    else
+      result.stop(SimulationStatus::not_finite,
+                  fmt::format("the adjoint met a matrix that cannot be factored in the step at t = {:.6g} s", t_back));
     return run.finish();
   }
   add_start_gradient(run.assembly(), sweep.lambda(), sweep.mu(), result);

@@ -28,27 +28,29 @@ double sign_of(double x) { return x > 0 ? 1 : (x < 0 ? -1 : 0); }
 }  // namespace
 
 JumpWatch::JumpWatch(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
-                     MotionSource* motion)
-    : mechanism_(mechanism), motion_(motion), apart_(kApart * (settings.end_time - settings.start_time)) {
+                     MotionSource* motion, std::vector<Jump>& found)
+    : mechanism_(mechanism),
+      motion_(motion),
+      apart_(kApart * (settings.end_time - settings.start_time)),
+      found_(found) {
   const MechanismData& d = mechanism_.data();
   if (d.active.empty()) return;
-  const auto of_force = [](int index) { return Jump{Jump::Owner::force, index, {}, 0, 0, {}, false}; };
   // A mechanism and its laws are compiled at each rho; so are the switches of the laws.
-  const auto add_law = [&](const Jump& jump, const Program& p, Inputs of, ForcePlace place = {}) {
-    add(jump, p, switches_of(p), of, place);
+  const auto add_law = [&](Jump::Owner owner, int index, const Program& p, Inputs of, ForcePlace place = {}) {
+    add({.of = owner, .index = index}, p, switches_of(p), of, place);
   };
   d.forces->for_each([&]<class Kind>(const Kind& f, ForcePlace place) {
     if constexpr (HasLaw<Kind>)
-      if (f.law.program) add_law(of_force(f.force), *f.law.program, Inputs::law, place);
+      if (f.law.program) add_law(Jump::Owner::force, f.force, *f.law.program, Inputs::law, place);
   });
   for (const AppliedForce& f : d.applied)
-    for (const Program& component : f.components) add_law(of_force(f.force), component, Inputs::sensors);
+    for (const Program& component : f.components) add_law(Jump::Owner::force, f.force, component, Inputs::sensors);
   for (const RowLaw& law : d.laws)
     if (law.drive >= 0 && law.law.programs)
-      add_law({Jump::Owner::drive, law.drive, {}, 0, 0, {}, false}, (*law.law.programs)[2], Inputs::time);
+      add_law(Jump::Owner::drive, law.drive, (*law.law.programs)[2], Inputs::time);
   for (const Cost& cost : costs)
     if (const SwitchedProgram* p = cost.running ? cost.running->program() : nullptr)
-      add({Jump::Owner::objective, 0, cost.name, 0, 0, {}, false}, p->program, p->switches, Inputs::sensors);
+      add({.of = Jump::Owner::objective, .objective = cost.name}, p->program, p->switches, Inputs::sensors);
 }
 
 bool JumpWatch::Function::is_new(const Switch& s) const {
@@ -115,14 +117,9 @@ std::string JumpWatch::begin(const StatePoint& at) {
   return {};
 }
 
-void JumpWatch::place_at(double theta) {
-  t_ = t0_ + theta * (t1_ - t0_);
-  hermite(y0_, y1_, t1_ - t0_, theta, y_);
-}
-
 void JumpWatch::set_inputs_at(double theta, const Function& f) {
-  place_at(theta);
-  set_inputs(f, {t_, y_, angles_, motion_});
+  hermite(y0_, y1_, t1_ - t0_, theta, y_);
+  set_inputs(f, {t0_ + theta * (t1_ - t0_), y_, angles_, motion_});
 }
 
 double JumpWatch::value(const Function& f, const Program& p, double theta) {
@@ -206,7 +203,7 @@ void JumpWatch::look_at_directions() {
     };
     if (f.is_k_times_d() || direction(y0_).dot(direction(y1_)) > kTurned || std::ranges::any_of(found_, is_known))
       continue;
-    found_.push_back({Jump::Owner::force, f.force, {}, 0, t1_, {}, true});
+    found_.push_back({.of = Jump::Owner::force, .index = f.force, .t = t1_, .motion = true});
   }
 }
 

@@ -31,11 +31,10 @@ namespace mbsopt {
 class JumpWatch final : public StepObserver {
  public:
   JumpWatch(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
-            MotionSource* motion);
+            MotionSource* motion, std::vector<Jump>& found);
 
   std::string begin(const StatePoint& at) override;
   std::string look_at(const SeenStep& step) override;
-  void add_to(SimulationStatistics& statistics) override { statistics.jumps = found_; }
 
  private:
   enum class Inputs { sensors, law, time };  // the inputs beside parameters and t
@@ -61,8 +60,7 @@ class JumpWatch final : public StepObserver {
   void add(const Jump& jump, const Program& program, std::span<const Program> switches, Inputs of,
            ForcePlace place = {});
   void set_inputs(const Function& f, const StatePoint& at);
-  void place_at(double theta);  // sets t_, y_ between the last state and the present one
-  void set_inputs_at(double theta, const Function& f);
+  void set_inputs_at(double theta, const Function& f);          // between the last state and the present one
   bool search(Function& f, Switch& s, double from, double to);  // whether a jump or kink was reported
   void look_at_directions();                                    // of springs
   double value(const Function& f, const Program& p, double theta);
@@ -71,11 +69,11 @@ class JumpWatch final : public StepObserver {
   MotionSource* motion_;
   double apart_;  // [s]
   std::vector<Function> functions_;
-  double t0_ = 0, t1_ = 0, t_ = 0;
+  double t0_ = 0, t1_ = 0;
   Eigen::VectorXd y0_, y1_, y_, angles_;
   std::vector<double> inputs_;
   Program::Scratch scratch_;
-  std::vector<Jump> found_;
+  std::vector<Jump>& found_;  // of the result
 };
 
 }  // namespace mbsopt

@@ -8,6 +8,7 @@
 
 #include "core/body/state_layout.hpp"
 #include "core/force/forces.hpp"
+#include "core/run/run_ends.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/start/driven_path.hpp"
 
@@ -45,11 +46,12 @@ double size_of(const Energy& e) { return e.kinetic + std::abs(e.potential); }
 
 }  // namespace
 
-RunGuard::RunGuard(const MechanismData& data, Projector& projector, double t_end, long max_steps, bool objects)
+RunGuard::RunGuard(const MechanismData& data, Projector& projector, const SimulationSettings& settings,
+                   SimulationStatistics& statistics, bool objects)
     : data_(data),
       projector_(projector),
-      t_end_(t_end),
-      max_steps_(max_steps),
+      settings_(settings),
+      statistics_(statistics),
       objects_(objects),
       conserves_energy_(conserves_energy(data)),
       law_jumps_(data) {}
@@ -57,9 +59,8 @@ RunGuard::RunGuard(const MechanismData& data, Projector& projector, double t_end
 std::string RunGuard::begin(const StatePoint& start) {
   const Eigen::VectorXd& y = start.y;
   before_t_ = last_t_ = start.t;
-  last_y_ = y;
   const Energy e = energy(data_, y, start.angles);
-  energy_initial_ = energy_final_ = e.kinetic + e.potential;
+  statistics_.energy_initial = statistics_.energy_final = e.kinetic + e.potential;
   if (!objects_) return {};
   energy_largest_ = size_of(e);
   bounds_ = {kFastest, kFastestTurn};
@@ -72,7 +73,8 @@ std::string RunGuard::begin(const StatePoint& start) {
 std::string RunGuard::about_turns(const StatePoint& start) const {
   for (int i = 1; i <= data_.n; ++i) {
     const double omega = speeds(start.y, i, data_.n)(1);
-    if (!(omega * (t_end_ - start.t) > std::numbers::pi * static_cast<double>(max_steps_))) continue;
+    const long most = settings_.integrator.max_steps;
+    if (!(omega * (settings_.end_time - start.t) > std::numbers::pi * static_cast<double>(most))) continue;
     const std::string& body = data_.body_names[static_cast<std::size_t>(i)];
     if (!std::isfinite(omega))
       return fmt::format("body '{}' has an angular velocity at the start that is too large for a number", body);
@@ -80,20 +82,22 @@ std::string RunGuard::about_turns(const StatePoint& start) const {
         "body '{}' turns at {:.3g} rad/s at the start. Each half turn takes a step at least, and until t = {:.6g} s "
         "there are more of them than simulation.integrator.max_steps, {}. Is the angular velocity in rad/s, and the "
         "end in s?",
-        body, omega, t_end_, max_steps_);
+        body, omega, settings_.end_time, most);
   }
   return {};
 }
 
 std::string RunGuard::about_energy(double t, const Energy& energy) {
+  SimulationStatistics& s = statistics_;
   energy_largest_ = std::max(energy_largest_, size_of(energy));
-  const double now = energy_final_, grown = now - energy_initial_;
+  if (s.energy_drift > kNoticeableChange * energy_natural_) s.relative_energy_drift = s.energy_drift / energy_largest_;
+  const double now = s.energy_final, grown = now - s.energy_initial;
   if (!(grown > kGrown * energy_largest_ && grown > kNoticeableChange * energy_natural_)) return {};
   return fmt::format(
       "the energy has grown from {:.3g} J to {:.3g} J at t = {:.6g} s, although nothing does work: the steps are too "
       "large for this motion. Use a smaller simulation.integrator.step, or an adaptive integrator with smaller rtol "
       "and atol",
-      energy_initial_, now, t);
+      s.energy_initial, now, t);
 }
 
 std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {
@@ -115,12 +119,9 @@ std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {
 std::string RunGuard::look_at(const SeenStep& step) {
   const auto& [t, y, angles, motion, ydot] = step.to;
   double relative = 0;
-  position_violation_ = std::max(position_violation_, projector_.position_violation(t, angles, y, &relative));
-  relative_violation_ = std::max(relative_violation_, relative);
-  velocity_violation_ = std::max(velocity_violation_, projector_.velocity_violation(t, y));
+  const double position = projector_.position_violation(t, angles, y, &relative);
   const Energy e = energy(data_, y, angles);
-  energy_final_ = e.kinetic + e.potential;
-  energy_drift_ = std::max(energy_drift_, std::abs(energy_final_ - energy_initial_));
+  note_state(position, relative, projector_.velocity_violation(t, y), e, statistics_);
   if (!objects_) return {};
   std::string words = law_jumps_.between(before_t_, t);  // from one step before: this one may begin at a jump
   before_t_ = last_t_;
@@ -135,20 +136,8 @@ std::string RunGuard::look_at(const SeenStep& step) {
   }
   if (words.empty() && conserves_energy_) words = about_energy(t, e);
   if (words.empty()) words = about_speed(t, y);
-  if (words.empty()) words = past_half_turn(data_, last_y_, t, y);
-  last_y_ = y;
+  if (words.empty()) words = past_half_turn(data_, step.from.y, t, y);
   return words;
-}
-
-void RunGuard::add_to(SimulationStatistics& s) {
-  s.energy_initial = energy_initial_;
-  s.energy_final = energy_final_;
-  s.energy_drift = energy_drift_;
-  if (objects_ && conserves_energy_ && energy_drift_ > kNoticeableChange * energy_natural_)
-    s.relative_energy_drift = energy_drift_ / energy_largest_;
-  s.max_position_violation = position_violation_;
-  s.relative_position_violation = relative_violation_;
-  s.max_velocity_violation = velocity_violation_;
 }
 
 }  // namespace mbsopt

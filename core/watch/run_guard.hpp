@@ -9,10 +9,10 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/projection/projection.hpp"
+#include "core/scene/settings.hpp"
 #include "core/start/law_jumps.hpp"
 #include "core/watch/step_observer.hpp"
 
@@ -20,13 +20,13 @@ namespace mbsopt {
 
 class RunGuard final : public StepObserver {
  public:
-  // A run to t_end in at most max_steps steps, of which each half turn of a body takes at least one. The projector only
-  // measures violations. Without `objects` there are no objections: given steps have been judged where they were found.
-  RunGuard(const MechanismData& data, Projector& projector, double t_end, long max_steps, bool objects = true);
+  // Each half turn of a body takes at least one of the steps of the settings. The projector only measures violations.
+  // Without `objects` there are no objections: given steps have been judged where they were found.
+  RunGuard(const MechanismData& data, Projector& projector, const SimulationSettings& settings,
+           SimulationStatistics& statistics, bool objects = true);
 
   std::string begin(const StatePoint& start) override;
   std::string look_at(const SeenStep& step) override;
-  void add_to(SimulationStatistics& statistics) override;
 
  private:
   std::string about_turns(const StatePoint& start) const;
@@ -35,16 +35,13 @@ class RunGuard final : public StepObserver {
 
   const MechanismData& data_;
   Projector& projector_;
-  const double t_end_;
-  const long max_steps_;
+  const SimulationSettings& settings_;
+  SimulationStatistics& statistics_;
   const bool objects_, conserves_energy_;
   LawJumps law_jumps_;
   double last_t_ = 0, before_t_ = 0;
-  Eigen::VectorXd last_y_;
-  double energy_initial_ = 0, energy_largest_ = 0, energy_natural_ = 0;  // natural: of weights and springs [J]
-  double energy_final_ = 0, energy_drift_ = 0;
-  double position_violation_ = 0, relative_violation_ = 0, velocity_violation_ = 0;
-  Eigen::Vector2d bounds_;  // of the speed of a centre of mass [m/s] and of turning [rad/s]
+  double energy_largest_ = 0, energy_natural_ = 0;  // natural: of weights and springs [J]
+  Eigen::Vector2d bounds_;                          // of the speed of a centre of mass [m/s] and of turning [rad/s]
 };
 
 }  // namespace mbsopt

@@ -1,11 +1,5 @@
-// An observer looks at a run while it goes on. All have one signature, by whatever method the run is integrated:
-//
-//   begin(start)        at the start of the run
-//   split(step)         each step that could be accepted: where it should end instead
-//   look_at(step)       each accepted step
-//   add_to(statistics)  after the last one
-//
-// A run asks its observers in the order of their list. An objection, in words, ends the run.
+// An observer looks at a run while it goes on. All have one signature, by whatever method the run is integrated. A run
+// asks its observers in the order of their list. An objection, in words, ends the run.
 #pragma once
 
 #include <cmath>
@@ -37,7 +31,6 @@ class StepObserver {
   virtual double split(const SeenStep&) { return INFINITY; }
   // Returns an objection to this step, or nothing.
   virtual std::string look_at(const SeenStep& step) = 0;
-  virtual void add_to(SimulationStatistics&) {}
 };
 
 // The first objection of the observers to the start of a run, or to a step.

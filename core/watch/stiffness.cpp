@@ -41,7 +41,8 @@ double real_stability_boundary(const Method& rk) {
   return inside;
 }
 
-StiffnessWatch::StiffnessWatch(const Method& rk, Eigen::Index states) {
+StiffnessWatch::StiffnessWatch(const Method& rk, Eigen::Index states, SimulationStatistics& statistics)
+    : statistics_(statistics) {
   if (rk.implicit() || rk.stages < 3 || !rk.adaptive) return;
   second_ = rk.stages - 1;
   for (int i = 0; i < second_; ++i)
@@ -70,20 +71,14 @@ std::string StiffnessWatch::look_at(const SeenStep& seen) {
 void StiffnessWatch::compare(const Eigen::Ref<const Eigen::VectorXd>& Y_a, const Eigen::Ref<const Eigen::VectorXd>& K_a,
                              const Eigen::Ref<const Eigen::VectorXd>& Y_b, const Eigen::Ref<const Eigen::VectorXd>& K_b,
                              double h) {
-  ++watched_;
+  ++statistics_.watched_steps;
   constexpr double kRounding = 100 * std::numeric_limits<double>::epsilon();
   const double apart = (Y_b - Y_a).norm();
   if (!(apart > kRounding * Y_b.norm())) return;  // rounding says nothing of f_y
   const double rate = (K_b - K_a).norm() / apart;
   if (!(h * rate > kNear * boundary_ && h * rate < kBeyond * boundary_)) return;
-  ++limited_;
-  stiffest_ = std::max(stiffest_, rate);
-}
-
-void StiffnessWatch::add_to(SimulationStatistics& statistics) {
-  statistics.watched_steps += watched_;
-  statistics.stability_limited_steps += limited_;
-  statistics.stiffest_rate = std::max(statistics.stiffest_rate, stiffest_);
+  ++statistics_.stability_limited_steps;
+  statistics_.stiffest_rate = std::max(statistics_.stiffest_rate, rate);
 }
 
 bool is_stability_limited(const SimulationStatistics& statistics) {

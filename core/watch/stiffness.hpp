@@ -29,10 +29,9 @@ class StiffnessWatch final : public StepObserver {
   // boundary.
   static constexpr double kNear = 0.6, kBeyond = 1.3;
 
-  StiffnessWatch(const Method& rk, Eigen::Index states);
+  StiffnessWatch(const Method& rk, Eigen::Index states, SimulationStatistics& statistics);
 
   std::string look_at(const SeenStep& step) override;
-  void add_to(SimulationStatistics& statistics) override;
 
  private:
   void compare(const Eigen::Ref<const Eigen::VectorXd>& Y_a, const Eigen::Ref<const Eigen::VectorXd>& K_a,
@@ -44,8 +43,7 @@ class StiffnessWatch final : public StepObserver {
   double boundary_ = 0;
   Eigen::VectorXd Y_last_, K_last_;  // across steps
   double t_last_ = 0, h_last_ = 0;
-  long watched_ = 0, limited_ = 0;
-  double stiffest_ = 0;
+  SimulationStatistics& statistics_;
 };
 
 // Returns whether stability limited most steps, and as many as stiff motion takes.

@@ -1,4 +1,4 @@
-// The error of the accelerations at a state because joints hold it too weakly for simulation.formulation.alpha.
+// Joints that hold too weakly for simulation.formulation.alpha.
 //
 // A loop that locks only by a small angle d between its axes has an eigenvalue j of J inv(M) J' as small as d^2. If
 // alpha j is below 1, a refinement gains nearly nothing, and the loop gives way. The residual of the row does not show
@@ -8,9 +8,9 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "core/mechanism/mechanism.hpp"
-#include "core/run/simulation_result.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/settings.hpp"
+#include "core/watch/step_observer.hpp"
 
 namespace mbsopt {
 
@@ -24,5 +24,23 @@ void add_residuals(const Mechanism& mechanism, const FormulationSettings& settin
                    const StatePoint& end, SimulationStatistics& statistics);
 // A message for an error that makes accelerations too rough for normal steps; empty for a smaller one.
 std::string weak_joints_objection(double error);
+
+// Watches what projection takes out of the velocities of a penalty formulation: the constraint accelerations that the
+// penalty leaves. They hide too small an alpha.
+//
+//   share = sum |v_hat - v1| / sum (|v_hat - v0| + h |g| sqrt(m))      |v|: the norm of the kinetic energy
+//
+// v_hat: before projection; v0, v1: at the ends of the step. If nothing moves, loads would move it as gravity g does.
+class PenaltyWatch final : public StepObserver {
+ public:
+  explicit PenaltyWatch(const MechanismData& data) : data_(data) {}
+
+  std::string look_at(const SeenStep& step) override;
+  double share() const { return moved_ > 0 ? projected_ / moved_ : 0; }
+
+ private:
+  const MechanismData& data_;
+  double projected_ = 0, moved_ = 0;
+};
 
 }  // namespace mbsopt
