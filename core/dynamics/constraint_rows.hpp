@@ -7,7 +7,7 @@
 
 #include "core/dynamics/row_products.hpp"
 #include "core/linear/block_cholesky.hpp"
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 #include "core/linear/pairs.hpp"
 #include "core/linear/prefetch.hpp"
 #include "core/mechanism/mechanism_data.hpp"

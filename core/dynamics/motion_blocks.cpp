@@ -3,7 +3,7 @@
 #include <cassert>
 #include <cstddef>
 
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 #include "core/mechanism/coupling.hpp"
 
 namespace mbsopt {
@@ -18,7 +18,7 @@ void list(const std::vector<std::vector<int>>& bodies, std::vector<MotionBlocks:
   begin.push_back(static_cast<int>(places.size()));
 }
 
-// The blocks in the form of block_kernels.hpp.
+// The blocks in the form of kernel_table.hpp.
 template <int Rows>
 const MotionBlockView<Rows>* view(const std::vector<MotionBlocks::Block<Rows>>& blocks) {
   using Ours = MotionBlocks::Block<Rows>;

@@ -11,7 +11,7 @@
 
 #include <vector>
 
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 

@@ -7,7 +7,7 @@
 #include "core/dynamics/planar_constraints.hpp"
 #include "core/dynamics/row_products.hpp"
 #include "core/linear/block_cholesky.hpp"
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 #include "core/linear/pairs.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"

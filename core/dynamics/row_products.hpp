@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 #include "core/linear/parameter_block.hpp"
 
 namespace mbsopt {

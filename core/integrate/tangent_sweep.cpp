@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 
 namespace mbsopt {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 #include "core/linear/prefetch.hpp"
 
 namespace mbsopt {
@@ -55,7 +55,7 @@ void subtract_product(const Mat<N, N>& A, const Mat<N, N>& B, Mat<N, N>& C) {
   C.noalias() -= A.lazyProduct(B.transpose());
 }
 
-// block_kernels.hpp treats blocks of six.
+// kernel_table.hpp treats blocks of six.
 bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
   return block_kernels().factor_diagonal(A.data(), inverse.data());
 }

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/linear/block_kernels.hpp"
 #include "core/linear/elimination.hpp"
 #include "core/linear/fixed_size.hpp"
+#include "core/linear/kernel_table.hpp"
 
 namespace mbsopt {
 

@@ -1,6 +1,7 @@
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 
 #include "core/linear/block_loops.hpp"
+#include "core/linear/columns.hpp"
 #include "core/linear/lu_loops.hpp"
 #include "core/linear/pairs.hpp"
 
@@ -10,24 +11,7 @@ namespace {
 static_assert(kLanes == 4);  // as in block_kernels_avx2.cpp
 
 template <int M>
-struct ColumnOfPairs : Column<M / 2> {
-  static constexpr int kRegisters = M / 2;
-  using Column<M / 2>::Column;
-  static ColumnOfPairs zero() {
-    static constexpr double kZeros[M] = {};
-    return ColumnOfPairs(kZeros);
-  }
-  double dot(const double* y) const {
-    const Pair sum = this->times(y);
-    return sum[0] + sum[1];
-  }
-  // y -= s x of the entries from `first` on; those of x before it are zero.
-  static void subtract_from(int first, double s, const double* x, double* y) {
-    const Pair ss = {s, s};
-    for (int i = first / 2; i < kRegisters; ++i)
-      reinterpret_cast<Pair*>(y)[i] -= ss * reinterpret_cast<const Pair*>(x)[i];
-  }
-};
+using ColumnOfPairs = Column<Pairs, M>;
 
 }  // namespace
 

@@ -127,4 +127,10 @@ struct BlockKernels {
                      const double* q0, const double* v0, double* q, double* v);
 };
 
+const BlockKernels& block_kernels();  // for this processor
+
+// Each set by itself, for tests. avx2_block_kernels() is null if the program or the processor lacks AVX2.
+const BlockKernels& portable_block_kernels();
+const BlockKernels* avx2_block_kernels();
+
 }  // namespace mbsopt

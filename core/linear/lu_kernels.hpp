@@ -1,5 +1,5 @@
-// The innermost loops of BlockLu. As those of kernel_table.hpp they are compiled twice, for any processor and for AVX2,
-// and take plain arrays.
+// The innermost loops of BlockLu. As those of kernel_table.hpp they are compiled twice, for any processor and for
+// AVX2, and take plain arrays.
 #pragma once
 
 namespace mbsopt {

@@ -1,14 +1,9 @@
-// Pairs of doubles, columns of them held in registers, and rows of lanes: vector types of GCC and Clang, for any
-// processor. The innermost loops of the block solvers use them. Eigen's fixed-size expressions would go through memory.
+// Rows of lanes in pairs of registers (columns.hpp), for the innermost loops on any processor.
 #pragma once
 
 #include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
-
-// The attributes belong to the alias, not to the type: Clang would drop a smaller alignment there.
-using Pair __attribute__((aligned(8), may_alias)) = double __attribute__((vector_size(16)));
-static_assert(alignof(Pair) == 8);
 
 // One row of lanes (fixed_size.hpp) in registers. A single vector of four would stay in memory if the processor's
 // registers hold two.
@@ -54,42 +49,5 @@ template <int N>
 const LaneRow* entries(const Lanes<N>& x) {
   return reinterpret_cast<const LaneRow*>(x.data());
 }
-
-// A column of 2 Pairs numbers.
-template <int Pairs>
-struct Column {
-  Pair x[Pairs];
-
-  explicit Column(const double* from) {
-#pragma GCC unroll 16
-    for (int i = 0; i < Pairs; ++i) x[i] = reinterpret_cast<const Pair*>(from)[i];
-  }
-  void add(double s, const double* y) {
-    const Pair ss = {s, s};
-#pragma GCC unroll 16
-    for (int i = 0; i < Pairs; ++i) x[i] += ss * reinterpret_cast<const Pair*>(y)[i];
-  }
-  void subtract(double s, const double* y) {
-    const Pair ss = {s, s};
-#pragma GCC unroll 16
-    for (int i = 0; i < Pairs; ++i) x[i] -= ss * reinterpret_cast<const Pair*>(y)[i];
-  }
-  void scale(double s) {
-    const Pair ss = {s, s};
-#pragma GCC unroll 16
-    for (int i = 0; i < Pairs; ++i) x[i] *= ss;
-  }
-  // x'y as two halves that are not yet added.
-  Pair times(const double* y) const {
-    Pair sum = x[0] * reinterpret_cast<const Pair*>(y)[0];
-#pragma GCC unroll 16
-    for (int i = 1; i < Pairs; ++i) sum += x[i] * reinterpret_cast<const Pair*>(y)[i];
-    return sum;
-  }
-  void store(double* to) const {
-#pragma GCC unroll 16
-    for (int i = 0; i < Pairs; ++i) reinterpret_cast<Pair*>(to)[i] = x[i];
-  }
-};
 
 }  // namespace mbsopt

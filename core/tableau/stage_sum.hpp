@@ -2,7 +2,9 @@
 // method has stages.
 #pragma once
 
-#include "core/linear/pairs.hpp"
+#include <Eigen/Core>
+
+#include "core/linear/columns.hpp"
 #include "core/tableau/method.hpp"
 
 namespace mbsopt {
@@ -19,10 +21,10 @@ class StageSum {
   }
   // y may be y0.
   void to(const double* y0, double* y, Eigen::Index size) const {
-    constexpr Eigen::Index kPairs = 4;
+    constexpr int kAtOnce = 8;
     Eigen::Index r = 0;
-    for (; r + 2 * kPairs <= size; r += 2 * kPairs) {
-      Column<kPairs> sum(y0 + r);
+    for (; r + kAtOnce <= size; r += kAtOnce) {
+      Column<Pairs, kAtOnce> sum(y0 + r);
       for (int j = 0; j < terms_; ++j) sum.add(c_[j], k_[j] + r);
       sum.store(y + r);
     }

@@ -1,4 +1,4 @@
-#include "core/linear/block_kernels.hpp"
+#include "core/linear/kernel_table.hpp"
 
 #include <catch2/catch.hpp>
 
