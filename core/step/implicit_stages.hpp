@@ -19,7 +19,7 @@
 #include "core/step/component_tolerances.hpp"
 #include "core/step/shifted_system.hpp"
 #include "core/step/step.hpp"
-#include "core/tableau/stage_groups.hpp"
+#include "core/tableau/method.hpp"
 
 namespace mbsopt {
 

@@ -6,7 +6,7 @@
 
 #include "core/step/stage_matrix.hpp"
 #include "core/step/step.hpp"
-#include "core/tableau/stage_groups.hpp"
+#include "core/tableau/method.hpp"
 
 namespace mbsopt {
 

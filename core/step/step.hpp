@@ -6,7 +6,7 @@
 
 #include "core/mechanism/mechanism.hpp"
 #include "core/projection/projection.hpp"
-#include "core/tableau/stage_groups.hpp"
+#include "core/tableau/method.hpp"
 #include "core/tableau/stage_sum.hpp"
 #include "core/tableau/tableaus.hpp"
 

@@ -21,6 +21,7 @@
 // in the list of tableaus.cpp. The tests run over that list.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <string_view>
@@ -45,36 +46,15 @@ struct Tableau {
 
 constexpr double magnitude(double x) { return x < 0 ? -x : x; }
 
-template <int S, int T>
-constexpr bool rows_sum_to_c(const Tableau<S, T>& rk) {
+template <std::size_t T>
+constexpr bool rows_sum_to(const std::array<double, T>& c, const std::array<std::array<double, T>, T>& A) {
   for (std::size_t i = 0; i < T; ++i) {
-    double sum = -rk.c[i], size = 1;
-    for (std::size_t j = 0; j < T; ++j) {
-      sum += rk.A[i][j];
-      size += magnitude(rk.A[i][j]);
+    double sum = -c[i], size = 1;
+    for (const double a : A[i]) {
+      sum += a;
+      size += magnitude(a);
     }
     if (magnitude(sum) > 1e-15 * size) return false;
-  }
-  return true;
-}
-template <int S, int T>
-constexpr bool gamma_rows_sum(const Tableau<S, T>& rk) {
-  for (std::size_t i = 0; i < T; ++i) {
-    double sum = -rk.gamma_sum[i], size = 1;
-    for (std::size_t j = 0; j < T; ++j) {
-      sum += rk.gamma[i][j];
-      size += magnitude(rk.gamma[i][j]);
-    }
-    if (magnitude(sum) > 1e-15 * size || rk.gamma[i][i] != rk.gamma[0][0]) return false;
-  }
-  return true;
-}
-template <int S, int T>
-constexpr bool is_explicit(const Tableau<S, T>& rk) {
-  for (std::size_t i = 0; i < T; ++i) {
-    for (std::size_t j = i; j < T; ++j) {
-      if (rk.A[i][j] != 0) return false;
-    }
   }
   return true;
 }
@@ -158,5 +138,29 @@ struct Method {
     return false;
   }
 };
+
+inline bool is_implicit(const Method& rk, const StageGroup& g) { return !rk.is_explicit_stage(g.first); }
+
+// The number of stages of the largest implicit group; 0 if the method is explicit.
+inline int largest_implicit_group(const Method& rk) {
+  int largest = 0;
+  for (const StageGroup& g : rk.stage_groups()) {
+    if (is_implicit(rk, g)) largest = std::max(largest, g.size());
+  }
+  return largest;
+}
+
+// Returns whether a step's result depends on the group through its weights, dense output, or later stages. An error
+// estimate does not count, because derivatives hold steps fixed.
+inline bool is_used(const Method& rk, const StageGroup& g, bool dense) {
+  if (dense) return true;
+  for (int i = g.first; i <= std::min(g.last, rk.stages - 1); ++i) {
+    if (rk.b[i] != 0) return true;
+    for (int k = g.last + 1; k < rk.stages; ++k) {
+      if (rk.a(k, i) != 0) return true;
+    }
+  }
+  return false;
+}
 
 }  // namespace mbsopt

@@ -38,6 +38,5 @@ inline constexpr Tableau<6> kRodas4{
                {-2.0801894941809365, 0.5957623556766833, 1.701617798267262, -0.08851451983588043, -0.3786761399271284,
                 0.25}}},
     .gamma_sum = {0.25, -0.1043, 0.1035, -0.0362, 0, 0}};
-static_assert(is_explicit(kRodas4) && rows_sum_to_c(kRodas4) && gamma_rows_sum(kRodas4) && dense_ends_at_step(kRodas4));
 
 }  // namespace mbsopt

@@ -34,6 +34,14 @@ constexpr void find_groups(const Tableau<S, T>& rk, Method& m) {
   }
 }
 
+template <std::size_t T>
+constexpr bool has_equal_diagonal(const std::array<std::array<double, T>, T>& gamma) {
+  for (std::size_t i = 0; i < T; ++i) {
+    if (gamma[i][i] != gamma[0][0]) return false;
+  }
+  return true;
+}
+
 template <int S, int T>
 constexpr bool ends_with_implicit_stage(const Tableau<S, T>& rk) {
   for (std::size_t i = 0; i < S; ++i) {
@@ -51,23 +59,25 @@ constexpr bool ends_with_rosenbrock_stage(const Tableau<S, T>& rk) {
   return true;
 }
 
-template <int S, int T>
-constexpr Method method(const Tableau<S, T>& rk) {
-  static_assert(T <= Method::kMaxStages);
+template <const auto& rk>
+constexpr Method method() {
+  constexpr std::size_t S = rk.b.size(), T = rk.c.size();
+  static_assert(T <= Method::kMaxStages && rows_sum_to(rk.c, rk.A) && dense_ends_at_step(rk));
+  static_assert(rows_sum_to(rk.gamma_sum, rk.gamma) && has_equal_diagonal(rk.gamma));
   Method m;
   m.name = rk.name;
   m.order = rk.order;
   m.dense_order = rk.dense_order;
   m.error_order = rk.error_order;
-  m.stages = S;
-  m.dense_stages = T;
+  m.stages = static_cast<int>(S);
+  m.dense_stages = static_cast<int>(T);
   m.c = rk.c.data();
   m.A = rk.A[0].data();
   m.b = rk.b.data();
   m.error = rk.error.data();
   if (any_nonzero(rk.error_low)) m.error_low = rk.error_low.data();
   m.dense = rk.dense[0].data();
-  m.nodes = S;
+  m.nodes = m.stages;
   m.node_c = m.c;
   m.node_b = m.b;
   if (rk.gamma[0][0] != 0) {
@@ -85,10 +95,11 @@ constexpr Method method(const Tableau<S, T>& rk) {
 }
 
 // The explicit methods come first.
-constexpr std::array kMethods{method(kEuler),   method(kRk2),     method(kBs3),       method(kRk4),    method(kDopri5),
-                              method(kTsit5),   method(kVerner6), method(kDopri853),  method(kSdirk2), method(kSdirk3),
-                              method(kSdirk4),  method(kGauss4),  method(kLobatto3c), method(kRodas4), method(kRadau5),
-                              method(kRadau1a), method(kGauss6)};
+constexpr std::array kMethods{method<kEuler>(),     method<kRk2>(),    method<kBs3>(),     method<kRk4>(),
+                              method<kDopri5>(),    method<kTsit5>(),  method<kVerner6>(), method<kDopri853>(),
+                              method<kSdirk2>(),    method<kSdirk3>(), method<kSdirk4>(),  method<kGauss4>(),
+                              method<kLobatto3c>(), method<kRodas4>(), method<kRadau5>(),  method<kRadau1a>(),
+                              method<kGauss6>()};
 std::size_t explicit_count() {
   static const auto count = std::ranges::count_if(kMethods, [](const Method& m) { return !m.implicit(); });
   return static_cast<std::size_t>(count);
