@@ -68,84 +68,66 @@ MatrixXd inverse(const MatrixXd& A) { return A.partialPivLu().inverse(); }
 
 VectorXd least_squares(const MatrixXd& A, const VectorXd& b) { return A.colPivHouseholderQr().solve(b); }
 
-// P A = L U, row by row; entries of L that are zero cost nothing.
-struct SquareFactor::Factors {
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> LU;  // L below the diagonal
-  Eigen::Matrix<Index, Eigen::Dynamic, 1> order;                              // row of A that became row k
-  VectorXd inverse_pivots, x;
-  LaneRows lanes;
-
-  // y is P b and becomes the solution, for single numbers or lanes.
-  template <class Y>
-  void solve(Y& y) const {
-    const Index n = LU.rows();
-    for (Index i = 1; i < n; ++i)
-      for (Index j = 0; j < i; ++j)
-        if (LU(i, j) != 0) y.row(i) -= LU(i, j) * y.row(j);
-    for (Index i = n - 1; i >= 0; --i) {
-      for (Index j = i + 1; j < n; ++j)
-        if (LU(i, j) != 0) y.row(i) -= LU(i, j) * y.row(j);
-      y.row(i) *= inverse_pivots(i);
-    }
+// For single numbers or lanes.
+template <class X>
+void SquareFactor::solve_permuted(X& x) const {
+  const Index n = LU_.rows();
+  for (Index i = 1; i < n; ++i)
+    for (Index j = 0; j < i; ++j)
+      if (LU_(i, j) != 0) x.row(i) -= LU_(i, j) * x.row(j);
+  for (Index i = n - 1; i >= 0; --i) {
+    for (Index j = i + 1; j < n; ++j)
+      if (LU_(i, j) != 0) x.row(i) -= LU_(i, j) * x.row(j);
+    x.row(i) *= inverse_pivots_(i);
   }
-};
-
-SquareFactor::SquareFactor() : factors_(std::make_unique<Factors>()) {}
-SquareFactor::SquareFactor(SquareFactor&&) noexcept = default;
-SquareFactor::~SquareFactor() = default;
+}
 
 bool SquareFactor::compute(const MatrixXd& A) {
   constexpr double kSingular = 1e-14;
   const Index n = A.rows();
-  auto& [LU, order, inverse_pivots, x, lanes] = *factors_;
-  LU = A;
-  order.setLinSpaced(n, 0, n - 1);
-  inverse_pivots.resize(n);
+  LU_ = A;
+  order_.setLinSpaced(n, 0, n - 1);
+  inverse_pivots_.resize(n);
   double largest = 0, least = std::numeric_limits<double>::infinity();
   for (Index k = 0; k < n; ++k) {
     Index pivot = k;
     for (Index i = k + 1; i < n; ++i)
-      if (std::abs(LU(i, k)) > std::abs(LU(pivot, k))) pivot = i;
-    if (pivot != k) LU.row(k).swap(LU.row(pivot)), std::swap(order(k), order(pivot));
-    const double size = std::abs(LU(k, k));
+      if (std::abs(LU_(i, k)) > std::abs(LU_(pivot, k))) pivot = i;
+    if (pivot != k) LU_.row(k).swap(LU_.row(pivot)), std::swap(order_(k), order_(pivot));
+    const double size = std::abs(LU_(k, k));
     largest = std::max(largest, size);
     least = std::min(least, size);
     if (!(size > 0)) return false;
-    inverse_pivots(k) = 1 / LU(k, k);
-    const double* const from = &LU(k, 0);
+    inverse_pivots_(k) = 1 / LU_(k, k);
+    const double* const from = &LU_(k, 0);
     for (Index i = k + 1; i < n; ++i) {
-      double* const to = &LU(i, 0);
+      double* const to = &LU_(i, 0);
       if (to[k] == 0) continue;
-      const double factor = to[k] *= inverse_pivots(k);
+      const double factor = to[k] *= inverse_pivots_(k);
       for (Index j = k + 1; j < n; ++j) to[j] -= factor * from[j];
     }
   }
   return n > 0 && least > kSingular * largest;
 }
-void SquareFactor::solve(Eigen::Ref<VectorXd> b) const {
-  VectorXd& x = factors_->x;
-  x = b(factors_->order);
-  factors_->solve(x);
-  b = x;
+void SquareFactor::solve(Eigen::Ref<VectorXd> b) {
+  x_ = b(order_);
+  solve_permuted(x_);
+  b = x_;
 }
-void SquareFactor::solve_lanes(Eigen::Ref<LaneRows> b) const {
-  LaneRows& x = factors_->lanes;
-  x.resize(b.rows(), kLanes);
-  for (Index i = 0; i < b.rows(); ++i) x.row(i) = b.row(factors_->order(i));
-  factors_->solve(x);
-  b = x;
+void SquareFactor::solve_lanes(Eigen::Ref<LaneRows> b) {
+  lanes_ = b(order_, Eigen::all);
+  solve_permuted(lanes_);
+  b = lanes_;
 }
-void SquareFactor::solve_transposed(Eigen::Ref<VectorXd> b) const {  // U'L'(P x) = b
-  const auto& LU = factors_->LU;
-  VectorXd& x = factors_->x;
-  x = b;
-  for (Index i = 0; i < x.size(); ++i) {
-    x(i) *= factors_->inverse_pivots(i);
-    for (Index j = i + 1; j < x.size(); ++j) x(j) -= LU(i, j) * x(i);
+void SquareFactor::solve_transposed(Eigen::Ref<VectorXd> b) {  // U'L'(P x) = b
+  x_ = b;
+  for (Index i = 0; i < x_.size(); ++i) {
+    x_(i) *= inverse_pivots_(i);
+    for (Index j = i + 1; j < x_.size(); ++j) x_(j) -= LU_(i, j) * x_(i);
   }
-  for (Index i = x.size() - 1; i > 0; --i)
-    for (Index j = 0; j < i; ++j) x(j) -= LU(i, j) * x(i);
-  b(factors_->order) = x;
+  for (Index i = x_.size() - 1; i > 0; --i)
+    for (Index j = 0; j < i; ++j) x_(j) -= LU_(i, j) * x_(i);
+  b(order_) = x_;
 }
 
 MatrixXd null_space(const MatrixXd& A, double threshold) {

@@ -76,22 +76,24 @@ struct LeastSingular {
 };
 LeastSingular least_singular(const Eigen::MatrixXd& A);
 
-// Factors of a small square matrix, by elimination with row pivoting.
+// Factors P A = L U of a small square matrix, by elimination with row pivoting. Entries of L that are zero cost
+// nothing.
 class SquareFactor {
  public:
-  SquareFactor();
-  SquareFactor(SquareFactor&&) noexcept;
-  ~SquareFactor();
-
   bool compute(const Eigen::MatrixXd& A);  // false where A is singular to rounding
   // b becomes the solution of A x = b, or of A'x = b. The _lanes forms take several b as columns.
-  void solve(Eigen::Ref<Eigen::VectorXd> b) const;
-  void solve_lanes(Eigen::Ref<LaneRows> b) const;
-  void solve_transposed(Eigen::Ref<Eigen::VectorXd> b) const;
+  void solve(Eigen::Ref<Eigen::VectorXd> b);
+  void solve_lanes(Eigen::Ref<LaneRows> b);
+  void solve_transposed(Eigen::Ref<Eigen::VectorXd> b);
 
  private:
-  struct Factors;
-  std::unique_ptr<Factors> factors_;
+  template <class X>
+  void solve_permuted(X& x) const;  // x = P b becomes the solution
+
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> LU_;  // L below the diagonal
+  Eigen::Matrix<Eigen::Index, Eigen::Dynamic, 1> order_;                       // row of A that became row k
+  Eigen::VectorXd inverse_pivots_, x_;
+  LaneRows lanes_;
 };
 
 // The complete orthogonal decomposition A P = Q [T 0; 0 0] Z (Golub and Van Loan, "Matrix Computations", section 5.4).
