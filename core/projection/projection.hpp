@@ -11,13 +11,20 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
-#include "core/projection/projection_solution.hpp"
 #include "core/scene/settings.hpp"
 
 namespace mbsopt {
+
+// The result of a projection, which determines its derivatives. In the plane, each body's entries are (along t1, along
+// t2, about n, 0, 0, 0).
+struct ProjectionSolution {
+  std::vector<Vec<6>> delta, u;
+  Eigen::VectorXd nu, kappa;
+};
 
 class Projector {
  public:
