@@ -55,6 +55,11 @@ template <class Rows>
 template <class X, class Y>
 void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings,
                                         std::vector<X>& x, Y& nu, Y& residual, std::vector<X>& correction) {
+  if (g.rows() == 0) {
+    x = b;
+    S_.solve(std::span(x));
+    return;
+  }
   residual = g;
   const SaddleIterate at{alpha_.data(), b[0].data(),     x[0].data(),
                          nu.data(),     residual.data(), static_cast<std::size_t>(alpha_.size())};
@@ -104,22 +109,11 @@ void BlockSaddleSolver<Rows>::refine(const SaddleIterate& at, bool from_zero, do
 template <class Rows>
 void BlockSaddleSolver<Rows>::solve(const Vector& b, const Eigen::VectorXd& g, const Settings& settings, Vector& x,
                                     Eigen::VectorXd& nu) {
-  if (g.size() == 0) {
-    x = b;
-    S_.solve(std::span(x));
-    return;
-  }
   solve_any(b, g, settings, x, nu, residual_, correction_);
 }
-
 template <class Rows>
 void BlockSaddleSolver<Rows>::solve(const LaneVector& b, const LaneRows& g, const Settings& settings, LaneVector& x,
                                     LaneRows& nu) {
-  if (g.rows() == 0) {
-    x = b;
-    S_.solve(std::span(x));
-    return;
-  }
   solve_any(b, g, settings, x, nu, residual_lanes_, correction_lanes_);
 }
 
