@@ -69,6 +69,12 @@ Vector3d ForceTerms::components_with_gradients(const AppliedForce& f, const At& 
   return c;
 }
 
+void ForceTerms::set_gradient(int sensor, const At& at) {
+  y_bar_.setZero();
+  rho_bar_.setZero();
+  add_gradient(data_, data_.sensors[index(sensor)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
+}
+
 void ForceTerms::add_loads(const At& at, std::vector<Vec<6>>& loads, bool but_springs) {
   const ForceInputs in = inputs(at);
   for_each(but_springs, [&](const auto& f, std::size_t i, std::size_t j) {
@@ -128,9 +134,7 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
     f.tangent(c, Lanes<3>::Zero(), frame, units[index(f.body)].p, nullptr, load);
     out.b[index(out.pair(f.body, f.body))].add(MotionBlocks::p, load);
     for (const int s : f.sensors) {
-      y_bar_.setZero();
-      rho_bar_.setZero();
-      add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
+      set_gradient(s, at);
       Lanes<3> dc = Lanes<3>::Zero();
       for (int i = 0; i < 3; ++i) dc(i, 0) = gradients_[index(i)][index(t + 1 + s)];
       load.setZero();
@@ -159,9 +163,7 @@ void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, st
     Lanes<3> dc = Lanes<3>::Zero();
     for (const int k : f.parameters) add_input(k, block.direction(k), dc);
     for (const int s : f.sensors) {
-      y_bar_.setZero();
-      rho_bar_.setZero();
-      add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
+      set_gradient(s, at);
       Lanes<1> direction = Lanes<1>::Zero();
       for (int lane = 0; lane < kLanes; ++lane) {
         if (block.parameter[lane] >= 0) direction(lane) = rho_bar_(block.parameter[lane]);

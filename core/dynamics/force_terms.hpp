@@ -72,7 +72,8 @@ class ForceTerms {
   void set_inputs(const AppliedForce& force, const At& at);
   Vector3d components(const AppliedForce& force, const At& at);
   Vector3d components_with_gradients(const AppliedForce& force, const At& at);
-  // After it: what a direction of an input adds to those of the components.
+  void set_gradient(int sensor, const At& at);  // y_bar_ and rho_bar_
+  // After components_with_gradients: what a direction of an input adds to those of the components.
   void add_input(int input, const Lanes<1>& direction, Lanes<3>& dc) const {
     for (int i = 0; i < 3; ++i)
       dc.row(i) += gradients_[static_cast<std::size_t>(i)][static_cast<std::size_t>(input)] * direction;
