@@ -1,7 +1,5 @@
 #include "core/dynamics/constraint_terms.hpp"
 
-#include <algorithm>
-
 #include "core/mechanism/constraint_gradient.hpp"
 
 namespace mbsopt {
@@ -120,29 +118,19 @@ void ConstraintTerms::add_pull_back(const Frames& frames, RowLaws& laws, const E
   laws.add_pull_back(weights.mu0, weights.mu1, weights.mu2, scale, theta_bar, rho_bar);
 }
 
-void ConstraintTerms::tangents(const Frames& frames, const std::vector<FrameTangent>& directions, RowLaws& laws,
+void ConstraintTerms::tangents(const Frames& frames, const std::vector<FrameTangent>* directions, RowLaws& laws,
                                const Eigen::VectorXd& angles, const ParameterBlock& block,
                                const Eigen::VectorXd& lambda, ConstraintTangents& out,
                                std::vector<Lanes<6>>& loads) const {
   for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
+  const auto direction = [&](int body) -> const FrameTangent& {
+    return directions ? (*directions)[static_cast<std::size_t>(body)] : kStill;
+  };
   for (const Constraint& c : data_->constraints) {
-    add_tangent(c, frames, laws, angles, directions[static_cast<std::size_t>(c.body1)],
-                directions[static_cast<std::size_t>(c.body2)], block, lambda, out, loads);
-  }
-  laws.subtract_tangents(block, {&out.phi, &out.phi_dot, &out.phi_ddot});
-}
-
-void ConstraintTerms::field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
-                                     const ParameterBlock& block, const Eigen::VectorXd& lambda,
-                                     ConstraintTangents& out, std::vector<Lanes<6>>& loads) const {
-  for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
-  for (const Constraint& c : data_->constraints) {
-    if (std::max({c.slot1, c.slot2, c.slot3, c.slot_factor}) < 0) continue;
-    if (!(block.moves(c.slot1, 3) || block.moves(c.slot2, 3) || block.moves(c.slot3, 3) ||
-          block.moves(c.slot_factor, 1))) {
-      continue;
+    if (directions || block.moves(c.slot1, 3) || block.moves(c.slot2, 3) || block.moves(c.slot3, 3) ||
+        block.moves(c.slot_factor, 1)) {
+      add_tangent(c, frames, laws, angles, direction(c.body1), direction(c.body2), block, lambda, out, loads);
     }
-    add_tangent(c, frames, laws, angles, kStill, kStill, block, lambda, out, loads);
   }
   laws.subtract_tangents(block, {&out.phi, &out.phi_dot, &out.phi_ddot});
 }

@@ -40,14 +40,11 @@ class ConstraintTerms {
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
   // Computes the tangents in the directions of the bodies and of the fields. Adds that of J'lambda to loads, one per
-  // body after the ground's.
-  void tangents(const Frames& frames, const std::vector<FrameTangent>& directions, RowLaws& laws,
+  // body after the ground's. If directions is null, bodies are at rest, and constraints and laws without such fields
+  // are skipped.
+  void tangents(const Frames& frames, const std::vector<FrameTangent>* directions, RowLaws& laws,
                 const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
                 ConstraintTangents& out, std::vector<Lanes<6>>& loads) const;
-  // Computes the tangents in the directions of the fields alone, with bodies at rest. Skips constraints and laws
-  // without such directions.
-  void field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles, const ParameterBlock& block,
-                      const Eigen::VectorXd& lambda, ConstraintTangents& out, std::vector<Lanes<6>>& loads) const;
 
  private:
   const MechanismData* data_;

@@ -175,7 +175,7 @@ const MotionBlocks& MotionTerms::blocks() {
 
 void MotionTerms::set_tangents(const ParameterBlock& block, const LaneRows& y_dir) {
   for (Lanes<6>& load : load_dirs_) load.setZero();
-  constraints_.field_tangents(frames, laws_, angles_, block, lambda, constraint_dirs_, load_dirs_);
+  constraints_.tangents(frames, nullptr, laws_, angles_, block, lambda, constraint_dirs_, load_dirs_);
   for (Lanes<6>& load : load_dirs_) load = -load;  // from (J'lambda)' to its share of b'
   forces_.add_field_tangent(here(), block, load_dirs_);
   if (!data_.user_forces.empty()) user_.add_field_tangent(here(), bodies, z, block, load_dirs_);

@@ -30,7 +30,7 @@ template <>
 inline void ProjectorOf<BodyInSpace>::set_tangents(ProjectionLevel, const Frames& frames, const ParameterBlock& block,
                                                    const Y& lambda) {
   for (Lanes<6>& load : load_dirs_) load.setZero();
-  constraints_.tangents(frames, frame_dirs_, laws_, angles_, block, lambda, dirs_, load_dirs_);
+  constraints_.tangents(frames, &frame_dirs_, laws_, angles_, block, lambda, dirs_, load_dirs_);
 }
 template <>
 inline void ProjectorOf<BodyInPlane>::set_tangents(ProjectionLevel level, const Frames&, const ParameterBlock& block,
@@ -44,7 +44,7 @@ inline void ProjectorOf<BodyInPlane>::set_tangents(ProjectionLevel level, const 
 template <>
 inline void ProjectorOf<BodyInSpace>::set_field_tangents(const ParameterBlock& block) {
   mu_.setZero();
-  constraints_.field_tangents(frames_, laws_, angles_, block, mu_, dirs_, load_dirs_);
+  constraints_.tangents(frames_, nullptr, laws_, angles_, block, mu_, dirs_, load_dirs_);
 }
 template <>
 inline void ProjectorOf<BodyInPlane>::set_field_tangents(const ParameterBlock& block) {
