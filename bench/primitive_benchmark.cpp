@@ -16,11 +16,10 @@ Frame moving_frame(double seed) {
   v.tail<4>() -= q.tail<4>().dot(v.tail<4>()) * q.tail<4>();
   Vec<6> z;
   z << 1, 2, seed, 0.3, -0.4, 0.2;
-  BodyState body;
   Frame frame;
-  set_position(q, body, frame);
-  set_velocity(v, body, frame);
-  set_acceleration(z, body, frame);
+  set_position(q, frame);
+  set_velocity(v, frame);
+  set_acceleration(z, frame);
   set_virtual(z, frame);
   return frame;
 }

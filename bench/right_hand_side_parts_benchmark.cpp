@@ -26,15 +26,14 @@ void parts(benchmark::State& state, const Linkage& linkage) {
   const MechanismData& data = whole.mechanism().data();
   const Eigen::VectorXd& y = whole.y();
   const std::size_t n = static_cast<std::size_t>(data.n);
-  std::vector<BodyState> bodies(n + 1);
   std::vector<Frame> frames(n + 1);
   const auto set_frames = [&] {
     const Vec<6> none = Vec<6>::Zero();
     for (int i = 1; i <= data.n; ++i) {
       const std::size_t k = static_cast<std::size_t>(i);
-      set_position(y.segment<7>(7 * (i - 1)), bodies[k], frames[k]);
-      set_velocity(y.segment<7>(7 * (data.n + i - 1)), bodies[k], frames[k]);
-      set_acceleration(none, bodies[k], frames[k]);
+      set_position(y.segment<7>(7 * (i - 1)), frames[k]);
+      set_velocity(y.segment<7>(7 * (data.n + i - 1)), frames[k]);
+      set_acceleration(none, frames[k]);
     }
   };
   RowLaws laws(data);

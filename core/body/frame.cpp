@@ -34,7 +34,7 @@ void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v
   const Lanes<4> pddot_dir = pddot_tangent(body, p_dir, pdot_dir);
   // Addot' = B(p, pddot') + B(p', pddot) + 2 B(pdot, pdot')
   set_B(body.p, pddot_dir, 1, out.Addot);
-  set_B(body.pddot(), p_dir, 1, other);
+  set_B(pddot_of(body), p_dir, 1, other);
   out.Addot += other;
   set_B(body.pdot, pdot_dir, 2, other);
   out.Addot += other;
@@ -98,33 +98,32 @@ void FrameTangent::set_zero() {
 Vector3d BodyState::omega() const { return omega_B(p, pdot); }
 
 // G(p)' omegadot/2 - (pdot'pdot) p, entry by entry: the processor would wait for a product that is kept in memory.
-Vector4d BodyState::pddot() const {
-  const double x = 0.5 * omegadot(0), y = 0.5 * omegadot(1), z = 0.5 * omegadot(2), s = pdot.squaredNorm();
-  const double e0 = p(0), e1 = p(1), e2 = p(2), e3 = p(3);
+Vector4d pddot_of(const BodyState& body) {
+  const Vector4d& p = body.p;
+  const double x = 0.5 * body.omegadot(0), y = 0.5 * body.omegadot(1), z = 0.5 * body.omegadot(2);
+  const double s = body.pdot.squaredNorm(), e0 = p(0), e1 = p(1), e2 = p(2), e3 = p(3);
   return {-e1 * x - e2 * y - e3 * z - s * e0, e0 * x - e3 * y + e2 * z - s * e1, e3 * x + e0 * y - e1 * z - s * e2,
           -e2 * x + e1 * y + e0 * z - s * e3};
 }
 
-void set_position(const Eigen::Ref<const Vec<7>>& q, BodyState& body, Frame& frame) {
-  body.p = q.tail<4>();
+void set_position(const Eigen::Ref<const Vec<7>>& q, Frame& frame) {
   frame.r = q.head<3>();
-  frame.A = A(body.p);
-  frame.p = body.p;
+  frame.p = q.tail<4>();
+  frame.A = A(frame.p);
 }
 
-void set_velocity(const Eigen::Ref<const Vec<7>>& v, BodyState& body, Frame& frame) {
-  body.pdot = v.tail<4>();
+void set_velocity(const Eigen::Ref<const Vec<7>>& v, Frame& frame) {
   frame.rdot = v.head<3>();
-  frame.Adot = B(body.p, body.pdot);
-  frame.pdot = body.pdot;
+  frame.pdot = v.tail<4>();
+  frame.Adot = B(frame.p, frame.pdot);
 }
 
-void set_acceleration(const Vec<6>& z, BodyState& body, Frame& frame) {
-  body.omegadot = z.tail<3>();
+void set_acceleration(const Vec<6>& z, Frame& frame) {
   frame.rddot = z.head<3>();
-  frame.Addot = 2 * A(body.pdot) - 2 * body.pdot.squaredNorm() * frame.A;
-  if ((body.omegadot.array() != 0).any()) frame.Addot += frame.A * skew(body.omegadot);
-  frame.pddot = body.pddot();
+  frame.omegadot = z.tail<3>();
+  frame.Addot = 2 * A(frame.pdot) - 2 * frame.pdot.squaredNorm() * frame.A;
+  if ((frame.omegadot.array() != 0).any()) frame.Addot += frame.A * skew(frame.omegadot);
+  frame.pddot = pddot_of(frame);
 }
 
 void set_virtual(const Vec<6>& eta, Frame& frame) {
@@ -132,12 +131,6 @@ void set_virtual(const Vec<6>& eta, Frame& frame) {
   frame.theta_eta = eta.tail<3>();
   frame.A_eta = frame.A * skew(frame.theta_eta);
   frame.p_eta = 0.5 * G_transposed_times(frame.p, frame.theta_eta);
-}
-
-Vec<7> acceleration(const BodyState& body, const Frame& frame) {
-  Vec<7> a;
-  a << frame.rddot, body.pddot();
-  return a;
 }
 
 Vec<6> to_virtual(const BodyState& body, const Vec<7>& w) {
@@ -175,7 +168,7 @@ void add_pull_back(const BodyState& body, FrameBar bar, const Vector4d& w_p, con
   const Mat<4, 4> K_dot = K(bar.Adot), K_ddot = K(bar.Addot);
   const Vector4d pddot_bar = K_ddot * body.p + w_p + bar.pddot;
   q_bar.head<3>() += bar.r;
-  q_bar.tail<4>() += bar.p + K(bar.A) * body.p + K_dot * body.pdot + K_ddot * body.pddot() +
+  q_bar.tail<4>() += bar.p + K(bar.A) * body.p + K_dot * body.pdot + K_ddot * pddot_of(body) +
                      0.5 * G_transposed_times_adjoint(body.omegadot, pddot_bar) - body.pdot.squaredNorm() * pddot_bar;
   v_bar.head<3>() += bar.rdot;
   v_bar.tail<4>() += bar.pdot + K_dot * body.p + 2 * (K_ddot * body.pdot) - 2 * body.p.dot(pddot_bar) * body.pdot;

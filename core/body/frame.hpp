@@ -15,13 +15,22 @@
 
 namespace mbsopt {
 
-struct Frame {
+// A body's own numbers at a state: q = (r, p), v = (rdot, pdot), z = (rddot, omegadot in body axes).
+struct BodyState {
+  Vector4d p{1, 0, 0, 0}, pdot = Vector4d::Zero();
+  Vector3d omegadot = Vector3d::Zero();
+
+  Vector3d omega() const;
+};
+Vector4d pddot_of(const BodyState& body);
+
+struct Frame : BodyState {
   Vector3d r = Vector3d::Zero(), rdot = Vector3d::Zero(), rddot = Vector3d::Zero();
   Matrix3d A = Matrix3d::Identity(), Adot = Matrix3d::Zero(), Addot = Matrix3d::Zero();
   // The virtual displacement of the adjoint sweep; A_eta = A skew(eta_theta).
   Vector3d r_eta = Vector3d::Zero(), theta_eta = Vector3d::Zero();
   Matrix3d A_eta = Matrix3d::Zero();
-  Vector4d p{1, 0, 0, 0}, pdot = Vector4d::Zero(), pddot = Vector4d::Zero(), p_eta = Vector4d::Zero();
+  Vector4d pddot = Vector4d::Zero(), p_eta = Vector4d::Zero();
 
   Vector3d point(const Vector3d& s) const { return r + A * s; }
   Vector3d point_dot(const Vector3d& s) const { return rdot + Adot * s; }
@@ -57,22 +66,10 @@ struct FrameTangent {
 };
 inline const FrameTangent kStill = FrameTangent::zero();
 
-// A body's own numbers at a state: q = (r, p), v = (rdot, pdot), z = (rddot, omegadot in body axes).
-struct BodyState {
-  Vector4d p{1, 0, 0, 0}, pdot = Vector4d::Zero();
-  Vector3d omegadot = Vector3d::Zero();
-
-  Vector3d omega() const;
-  Vector4d pddot() const;
-};
-
-void set_position(const Eigen::Ref<const Vec<7>>& q, BodyState& body, Frame& frame);
-void set_velocity(const Eigen::Ref<const Vec<7>>& v, BodyState& body, Frame& frame);
-void set_acceleration(const Vec<6>& z, BodyState& body, Frame& frame);
+void set_position(const Eigen::Ref<const Vec<7>>& q, Frame& frame);
+void set_velocity(const Eigen::Ref<const Vec<7>>& v, Frame& frame);
+void set_acceleration(const Vec<6>& z, Frame& frame);
 void set_virtual(const Vec<6>& eta, Frame& frame);
-
-// a = qddot from z: (rddot, pddot).
-Vec<7> acceleration(const BodyState& body, const Frame& frame);
 
 // T'w with T = da/dz: the cotangent of z = (rddot, omegadot) for w, that of a = (rddot, pddot).
 Vec<6> to_virtual(const BodyState& body, const Vec<7>& w);

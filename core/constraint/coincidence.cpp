@@ -9,9 +9,9 @@ namespace {
 //   Addot = A(p) (skew(omegadot) - 2 (pdot'pdot)) + 2 A(pdot)
 struct VectorBlocks {
   Mat<3, 4> xdd_p, xdd_pdot;
-  VectorBlocks(const BodyState& b, const Frame& f, const Vector3d& s)
-      : xdd_p(N(b.p, b.omegadot.cross(s) - 2 * b.pdot.squaredNorm() * s)),
-        xdd_pdot(2 * N(b.pdot, s) - 4 * (f.A * s) * b.pdot.transpose()) {}
+  VectorBlocks(const Frame& f, const Vector3d& s)
+      : xdd_p(N(f.p, f.omegadot.cross(s) - 2 * f.pdot.squaredNorm() * s)),
+        xdd_pdot(2 * N(f.pdot, s) - 4 * (f.A * s) * f.pdot.transpose()) {}
 };
 
 }  // namespace
@@ -50,15 +50,14 @@ void Coincidence::tangent(const Frame& f1, const Frame& f2, const FrameTangent& 
   out.load2 << Lanes<3>::Zero(), moment(g2, v2, lambda).d;
 }
 
-void Coincidence::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,
-                                 const Vec<3>& lambda, TurningBlocks<3>& out) const {
-  const VectorBlocks x(b1, f1, s1), y(b2, f2, s2);
+void Coincidence::turning_blocks(const Frame& f1, const Frame& f2, const Vec<3>& lambda, TurningBlocks<3>& out) const {
+  const VectorBlocks x(f1, s1), y(f2, s2);
   out.p1 = -x.xdd_p;
   out.pdot1 = -x.xdd_pdot;
   out.p2 = y.xdd_p;
   out.pdot2 = y.xdd_pdot;
-  out.moment1_p1 = -skew(s1) * N_transposed(b1.p, lambda);
-  out.moment2_p2 = skew(s2) * N_transposed(b2.p, lambda);
+  out.moment1_p1 = -skew(s1) * N_transposed(f1.p, lambda);
+  out.moment2_p2 = skew(s2) * N_transposed(f2.p, lambda);
   out.moment1_p2.setZero();
   out.moment2_p1.setZero();
 }

@@ -26,8 +26,7 @@ struct Coincidence {
   void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
                const GeometryTangent& s, const Vec<3>& lambda, PrimitiveTangent<3>& out) const;
 
-  void turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2, const Vec<3>& lambda,
-                      TurningBlocks<3>& out) const;
+  void turning_blocks(const Frame& f1, const Frame& f2, const Vec<3>& lambda, TurningBlocks<3>& out) const;
 };
 static_assert(IsPrimitive<Coincidence> && HasTurningBlocks<Coincidence>);
 

@@ -30,16 +30,15 @@ void Dot1::pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, 
   add_vector_bar(f2, s2, product_bar(x, weights(z)), 1, bar2, s.s2);
 }
 
-void Dot1::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,
-                          const Vec<1>& lambda, TurningBlocks<1>& out) const {
+void Dot1::turning_blocks(const Frame& f1, const Frame& f2, const Vec<1>& lambda, TurningBlocks<1>& out) const {
   const VectorJet x = vector_of(f1, s1), y = vector_of(f2, s2);
-  product_rows(y, b1, s1, x.x, out.p1, out.pdot1);
-  product_rows(x, b2, s2, y.x, out.p2, out.pdot2);
+  product_rows(y, f1, s1, x.x, out.p1, out.pdot1);
+  product_rows(x, f2, s2, y.x, out.p2, out.pdot2);
   const Matrix3d S1 = lambda(0) * skew(s1), S2 = lambda(0) * skew(s2);
-  out.moment1_p1 = S1 * N_transposed(b1.p, y.x);
-  out.moment1_p2 = S1 * (f1.A.transpose() * N(b2.p, s2));
-  out.moment2_p2 = S2 * N_transposed(b2.p, x.x);
-  out.moment2_p1 = S2 * (f2.A.transpose() * N(b1.p, s1));
+  out.moment1_p1 = S1 * N_transposed(f1.p, y.x);
+  out.moment1_p2 = S1 * (f1.A.transpose() * N(f2.p, s2));
+  out.moment2_p2 = S2 * N_transposed(f2.p, x.x);
+  out.moment2_p1 = S2 * (f2.A.transpose() * N(f1.p, s1));
 }
 
 }  // namespace mbsopt

@@ -18,8 +18,7 @@ struct Dot1 : SingleRow<Dot1> {
   void pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
                  GeometryBar& s) const;
 
-  void turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2, const Vec<1>& lambda,
-                      TurningBlocks<1>& out) const;
+  void turning_blocks(const Frame& f1, const Frame& f2, const Vec<1>& lambda, TurningBlocks<1>& out) const;
 };
 extern template struct SingleRow<Dot1>;
 static_assert(IsPrimitive<Dot1> && HasTurningBlocks<Dot1>);

@@ -91,9 +91,8 @@ Vec<P::kRows> virtual_change(const P& p, const Frame& f1, const Frame& f2) {
 
 // A primitive with turning_blocks(), a short cut to its tangents in all directions.
 template <class P>
-concept HasTurningBlocks = requires(const P p, const Frame f, const BodyState b, const Vec<P::kRows> lambda,
-                                    TurningBlocks<P::kRows> out) {
-  p.turning_blocks(b, f, b, f, lambda, out);
+concept HasTurningBlocks = requires(const P p, const Frame f, const Vec<P::kRows> lambda, TurningBlocks<P::kRows> out) {
+  p.turning_blocks(f, f, lambda, out);
 };
 
 }  // namespace mbsopt

@@ -11,6 +11,11 @@ void add_moment(int pair, double factor, const Mat<3, 4>& moment_p, MotionBlocks
   block.q.block<3, 4>(3, 3) -= factor * moment_p;
   block.parts |= MotionBlocks::p;
 }
+void add_row(int row, double factor, const Mat<1, 4>& by_p, const Mat<1, 4>& by_pdot, MotionBlocks& out) {
+  if (row < 0) return;
+  out.c[at(row)].add(MotionBlocks::p, factor * by_p);
+  out.c[at(row)].add(MotionBlocks::pdot, factor * by_pdot);
+}
 
 }  // namespace
 
@@ -69,9 +74,8 @@ void ConstraintBlocks::add_by_units(const Constraint& c, const P& p, const Place
   }
 }
 
-void ConstraintBlocks::add(const std::vector<BodyState>& bodies, const std::vector<Frame>& frames,
-                           const std::vector<UnitTangents>& units, const Eigen::VectorXd& lambda,
-                           MotionBlocks& out) const {
+void ConstraintBlocks::add(const std::vector<Frame>& frames, const std::vector<UnitTangents>& units,
+                           const Eigen::VectorXd& lambda, MotionBlocks& out) const {
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const Constraint& c = data_->constraints[k];
     const Places& place = places_[k];
@@ -82,22 +86,14 @@ void ConstraintBlocks::add(const std::vector<BodyState>& bodies, const std::vect
             if (!stabilised_) {
               const std::size_t i = at(c.body1), j = at(c.body2);
               TurningBlocks<m> x;
-              p.turning_blocks(bodies[i], frames[i], bodies[j], frames[j], lambda.segment<m>(c.row), x);
+              p.turning_blocks(frames[i], frames[j], lambda.segment<m>(c.row), x);
               add_moment(place.pair[0][0], c.factor, x.moment1_p1, out);
               add_moment(place.pair[0][1], c.factor, x.moment1_p2, out);
               add_moment(place.pair[1][0], c.factor, x.moment2_p1, out);
               add_moment(place.pair[1][1], c.factor, x.moment2_p2, out);
               for (int r = 0; r < m; ++r) {
-                if (c.body1 > 0) {
-                  MotionBlocks::Block<1>& row = out.c[at(place.row[0][at(r)])];
-                  row.add(MotionBlocks::p, -c.factor * x.p1.row(r));
-                  row.add(MotionBlocks::pdot, -c.factor * x.pdot1.row(r));
-                }
-                if (c.body2 > 0) {
-                  MotionBlocks::Block<1>& row = out.c[at(place.row[1][at(r)])];
-                  row.add(MotionBlocks::p, -c.factor * x.p2.row(r));
-                  row.add(MotionBlocks::pdot, -c.factor * x.pdot2.row(r));
-                }
+                add_row(place.row[0][at(r)], -c.factor, x.p1.row(r), x.pdot1.row(r), out);
+                add_row(place.row[1][at(r)], -c.factor, x.p2.row(r), x.pdot2.row(r), out);
               }
               return;
             }

@@ -14,9 +14,9 @@ class ConstraintBlocks {
 
   // Marks the bodies whose unit tangents add() reads. Some primitives have short cuts and read none.
   void mark_units(std::vector<bool>& bodies) const;
-  // bodies, frames and units begin with the ground.
-  void add(const std::vector<BodyState>& bodies, const std::vector<Frame>& frames,
-           const std::vector<UnitTangents>& units, const Eigen::VectorXd& lambda, MotionBlocks& out) const;
+  // frames and units begin with the ground.
+  void add(const std::vector<Frame>& frames, const std::vector<UnitTangents>& units, const Eigen::VectorXd& lambda,
+           MotionBlocks& out) const;
 
  private:
   // Indices of a constraint's blocks: those of body i's equations by body j, and those of each row by each body. -1

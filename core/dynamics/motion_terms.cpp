@@ -22,7 +22,6 @@ MotionTerms::MotionTerms(const MechanismData& data, const FormulationSettings& s
       forces_(data),
       user_(data) {
   const std::size_t n = static_cast<std::size_t>(data.n);
-  bodies.resize(n + 1);
   frames.resize(n + 1);
   body_loads_.resize(n + 1);
   load_dirs_.resize(n + 1);
@@ -49,13 +48,13 @@ void MotionTerms::set_time(double t, const Eigen::VectorXd& y, const Eigen::Vect
 
 void MotionTerms::set_body(const Eigen::VectorXd& y, std::size_t body) {
   const StateLayout layout{data_.n};
-  set_position(y.segment<7>(layout.q(body)), bodies[body], frames[body]);
-  set_velocity(y.segment<7>(layout.v(body)), bodies[body], frames[body]);
+  set_position(y.segment<7>(layout.q(body)), frames[body]);
+  set_velocity(y.segment<7>(layout.v(body)), frames[body]);
 }
 
 void MotionTerms::set_own_load(std::size_t body) {
   const BodyData& b = data_.bodies[body];
-  const Vector3d omega = bodies[body].omega();
+  const Vector3d omega = frames[body].omega();
   f[body - 1].head<3>() = b.mass * data_.gravity;
   f[body - 1].tail<3>() = -omega.cross(b.J * omega);
 }
@@ -64,17 +63,17 @@ void MotionTerms::add_forces() {
   if (!has_forces_) return;
   for (Vec<6>& load : body_loads_) load.setZero();
   forces_.add_loads(here(), body_loads_);
-  if (!data_.user_forces.empty()) user_.add_loads(here(), bodies, body_loads_);
+  if (!data_.user_forces.empty()) user_.add_loads(here(), body_loads_);
   for (std::size_t i = 0; i < f.size(); ++i) f[i] += body_loads_[i + 1];
 }
 
 void MotionTerms::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   set_time(t, y, angles);
   const Vec<6> none = Vec<6>::Zero();
-  for (std::size_t k = 1; k < bodies.size(); ++k) {
+  for (std::size_t k = 1; k < frames.size(); ++k) {
     prefetch(&frames[k], kAhead);
     set_body(y, k);
-    set_acceleration(none, bodies[k], frames[k]);
+    set_acceleration(none, frames[k]);
     set_own_load(k);
   }
   add_forces();
@@ -86,9 +85,9 @@ void MotionTerms::set_motion(double t, const Eigen::VectorXd& y, const Eigen::Ve
   const StateLayout layout{data_.n};
   set_time(t, y, angles);
   lambda = multipliers;
-  for (std::size_t k = 1; k < bodies.size(); ++k) {
+  for (std::size_t k = 1; k < frames.size(); ++k) {
     set_body(y, k);
-    const Vector4d& p = bodies[k].p;
+    const Vector4d& p = frames[k].p;
     z[k - 1].head<3>() = a.segment<3>(layout.q(k));
     z[k - 1].tail<3>() = (2 / p.squaredNorm()) * G_times(p, a.segment<4>(layout.p(k)));
   }
@@ -96,12 +95,12 @@ void MotionTerms::set_motion(double t, const Eigen::VectorXd& y, const Eigen::Ve
 }
 
 void MotionTerms::set_accelerations() {
-  for (std::size_t k = 1; k < bodies.size(); ++k) set_acceleration(z[k - 1], bodies[k], frames[k]);
+  for (std::size_t k = 1; k < frames.size(); ++k) set_acceleration(z[k - 1], frames[k]);
   if (linear_) linear_->current = false;
 }
 
 void MotionTerms::set_loads() {
-  for (std::size_t k = 1; k < bodies.size(); ++k) set_own_load(k);
+  for (std::size_t k = 1; k < frames.size(); ++k) set_own_load(k);
   add_forces();
 }
 
@@ -124,10 +123,10 @@ void MotionTerms::acceleration_errors(Eigen::VectorXd& out) {
 
 double MotionTerms::usual_acceleration(double enough) const {
   double largest = std::max(1e-9, data_.gravity.norm());
-  for (std::size_t k = 1; k < bodies.size() && !(largest >= enough); ++k) {
+  for (std::size_t k = 1; k < frames.size() && !(largest >= enough); ++k) {
     const BodyData& b = data_.bodies[k];
     const Vec<6>& load = f[k - 1];
-    const double omega = bodies[k].omega().norm();
+    const double omega = frames[k].omega().norm();
     largest = std::max(largest, omega * (omega + frames[k].rdot.norm()));
     if (b.mass > 0) largest = std::max(largest, load.head<3>().norm() / b.mass);
     if (b.J.trace() > 0) largest = std::max(largest, load.tail<3>().norm() / b.J.trace());
@@ -154,14 +153,14 @@ const MotionBlocks& MotionTerms::blocks() {
   if (x.current) return x.blocks;
   x.current = true;
   x.blocks.set_zero();
-  for (const std::size_t i : x.bodies_of_units) set_unit_tangents(bodies[i], x.units[i]);
-  x.constraints.add(bodies, frames, x.units, lambda, x.blocks);
+  for (const std::size_t i : x.bodies_of_units) set_unit_tangents(frames[i], x.units[i]);
+  x.constraints.add(frames, x.units, lambda, x.blocks);
   forces_.add_blocks(here(), x.units, x.blocks);
-  if (!data_.user_forces.empty()) user_.add_blocks(here(), bodies, z, x.blocks);
+  if (!data_.user_forces.empty()) user_.add_blocks(here(), z, x.blocks);
   for (int i = 1; i <= data_.n; ++i) {
     // -(omega x J omega)' = (skew(J omega) - skew(omega) J) omega',   omega' = 2 (G(p) pdot' - G(pdot) p')
     const std::size_t k = static_cast<std::size_t>(i);
-    const BodyState& body = bodies[k];
+    const BodyState& body = frames[k];
     const Matrix3d& J = data_.bodies[k].J;
     const Vector3d omega = body.omega();
     const Matrix3d by_omega = 2 * (skew(J * omega) - skew(omega) * J);
@@ -178,11 +177,11 @@ void MotionTerms::set_tangents(const ParameterBlock& block, const LaneRows& y_di
   constraints_.tangents(frames, nullptr, laws_, angles_, block, lambda, constraint_dirs_, load_dirs_);
   for (Lanes<6>& load : load_dirs_) load = -load;  // from (J'lambda)' to its share of b'
   forces_.add_field_tangent(here(), block, load_dirs_);
-  if (!data_.user_forces.empty()) user_.add_field_tangent(here(), bodies, z, block, load_dirs_);
+  if (!data_.user_forces.empty()) user_.add_field_tangent(here(), z, block, load_dirs_);
 
   Lanes<3> gravity_dir;
   const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
-  for (std::size_t k = 1; k < bodies.size(); ++k) {
+  for (std::size_t k = 1; k < frames.size(); ++k) {
     const BodyData& body = data_.bodies[k];
     Lanes<6>& b = b_dir[k - 1];
     b = load_dirs_[k];
@@ -192,7 +191,7 @@ void MotionTerms::set_tangents(const ParameterBlock& block, const LaneRows& y_di
     if (dg) b.topRows<3>() += body.mass * *dg;
     Lanes<6> J_dir;
     if (const Lanes<6>* dJ = block.field<6>(body.slot_J, J_dir)) {
-      const Vector3d omega = bodies[k].omega();
+      const Vector3d omega = frames[k].omega();
       b.bottomRows<3>() -= cross(omega, inertia_tangent_times(*dJ, omega));
     }
   }
@@ -217,11 +216,11 @@ void MotionTerms::add_pull_back(const std::vector<Vec<6>>& eta, const Eigen::Vec
   }
   constraints_.add_pull_back(frames, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
   forces_.add_pull_back(here(), bars_, y_bar, theta_bar, rho_bar);
-  if (!data_.user_forces.empty()) user_.add_pull_back(here(), bodies, z, eta, y_bar, rho_bar);
+  if (!data_.user_forces.empty()) user_.add_pull_back(here(), z, eta, y_bar, rho_bar);
 
-  for (std::size_t k = 1; k < bodies.size(); ++k) {
+  for (std::size_t k = 1; k < frames.size(); ++k) {
     const BodyData& body = data_.bodies[k];
-    const BodyState& state = bodies[k];
+    const BodyState& state = frames[k];
     const Vector3d eta_r = eta[k - 1].head<3>(), eta_w = eta[k - 1].tail<3>();
     mbsopt::add_pull_back(state, bars_[k], pddot_bar[k], eta_w, y_bar.segment<7>(layout.q(k)),
                           y_bar.segment<7>(layout.v(k)));

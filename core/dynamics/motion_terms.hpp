@@ -23,8 +23,7 @@ class MotionTerms {
  public:
   MotionTerms(const MechanismData& data, const FormulationSettings& settings);
 
-  // The motion: bodies and frames begin with the ground, z and f do not. The solver writes z and lambda.
-  std::vector<BodyState> bodies;
+  // The motion: frames begin with the ground, z and f do not. The solver writes z and lambda.
   std::vector<Frame> frames;
   std::vector<Vec<6>> f, z;
   Eigen::VectorXd lambda;

@@ -89,7 +89,6 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   for (std::size_t i = 1; i <= n; ++i) {
     if (loaded[i]) loaded_.push_back(i);
   }
-  states_in_space_.resize(n + 1);
   frames_in_space_.resize(n + 1);
   body_loads_.resize(n + 1);
   body_load_dirs_.resize(n + 1);
@@ -123,8 +122,8 @@ void PlanarDynamics::place_in_space() {
   in_space_ = true;
   const StateLayout layout{data_.n};
   for (const std::size_t k : loaded_) {
-    set_position(y_.segment<7>(layout.q(k)), states_in_space_[k], frames_in_space_[k]);
-    set_velocity(y_.segment<7>(layout.v(k)), states_in_space_[k], frames_in_space_[k]);
+    set_position(y_.segment<7>(layout.q(k)), frames_in_space_[k]);
+    set_velocity(y_.segment<7>(layout.v(k)), frames_in_space_[k]);
   }
 }
 
@@ -144,7 +143,7 @@ void PlanarDynamics::set_loads() {
   body_loads_[0].setZero();
   for (const std::size_t k : loaded_) body_loads_[k].setZero();
   forces_.add_loads(here(), body_loads_, springs_in_plane_);
-  user_.add_loads(here(), states_in_space_, body_loads_);
+  user_.add_loads(here(), body_loads_);
   for (const std::size_t k : loaded_) loads_[k - 1] += bodies_in_y_.reduced(k, body_loads_[k]);
 }
 
@@ -267,11 +266,11 @@ void PlanarDynamics::add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen:
     eta_in_space_[k - 1] = bodies_in_y_.in_space(k, eta_[k - 1]);
     set_virtual(eta_in_space_[k - 1], frames_in_space_[k]);
   }
-  user_.add_pull_back(here(), states_in_space_, no_mass_terms_, eta_in_space_, y_bar, rho_bar);
+  user_.add_pull_back(here(), no_mass_terms_, eta_in_space_, y_bar, rho_bar);
   forces_.add_pull_back(here(), bars_in_space_, y_bar, theta_bar, rho_bar, springs_in_plane_);
   const StateLayout layout{data_.n};
   for (const std::size_t k : loaded_) {
-    add_pull_back(states_in_space_[k], bars_in_space_[k], Vector4d::Zero(), eta_[k - 1](2) * model_.bodies[k].n,
+    add_pull_back(frames_in_space_[k], bars_in_space_[k], Vector4d::Zero(), eta_[k - 1](2) * model_.bodies[k].n,
                   y_bar.segment<7>(layout.q(k)), y_bar.segment<7>(layout.v(k)));
   }
 }

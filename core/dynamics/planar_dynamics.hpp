@@ -88,7 +88,6 @@ class PlanarDynamics {
   const UserLoads::Accelerations no_mass_terms_;
   std::vector<Vec<6>> eta_in_space_;
   std::vector<std::size_t> loaded_;
-  std::vector<BodyState> states_in_space_;
   std::vector<Frame> frames_in_space_;
   std::vector<Vec<6>> body_loads_;
 

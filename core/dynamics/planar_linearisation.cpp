@@ -55,9 +55,9 @@ void PlanarDynamics::prepare_force_tangents() {
   if (only_torques_) return;
   if (!in_space_) place_in_space();
   x.blocks.set_zero();
-  for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
+  for (const std::size_t k : loaded_) set_unit_tangents(frames_in_space_[k], x.units[k]);
   forces_.add_blocks(here(), x.units, x.blocks, torques_.lie_in_plane());
-  user_.add_blocks(here(), states_in_space_, no_mass_terms_, x.blocks);
+  user_.add_blocks(here(), no_mass_terms_, x.blocks);
   for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
     const MotionBlocks::Block<6>& block = x.blocks.b[k];
     if (block.parts == 0) continue;
@@ -141,7 +141,7 @@ void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRo
   for (const std::size_t k : loaded_) body_load_dirs_[k].setZero();
   body_load_dirs_[0].setZero();
   forces_.add_field_tangent(here(), block, body_load_dirs_);
-  user_.add_field_tangent(here(), states_in_space_, no_mass_terms_, block, body_load_dirs_);
+  user_.add_field_tangent(here(), no_mass_terms_, block, body_load_dirs_);
   for (const std::size_t k : loaded_) rhs_lanes_[k - 1] += bodies_in_y_.reduced(k, body_load_dirs_[k]);
 }
 

@@ -32,11 +32,11 @@ bool SpatialDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::
 
   ydot.head(layout.positions()) = y.tail(layout.positions());
   bool finite = true;
-  for (std::size_t k = 1; k < terms_.bodies.size(); ++k) {
+  for (std::size_t k = 1; k < terms_.frames.size(); ++k) {
     const Vec<6>& z = terms_.z[k - 1];
-    terms_.bodies[k].omegadot = z.tail<3>();
+    terms_.frames[k].omegadot = z.tail<3>();
     ydot.segment<3>(layout.v(k)) = z.head<3>();
-    ydot.segment<4>(layout.pdot(k)) = terms_.bodies[k].pddot();
+    ydot.segment<4>(layout.pdot(k)) = pddot_of(terms_.frames[k]);
     finite = finite && z.allFinite();
   }
   return finite;
@@ -60,13 +60,13 @@ void SpatialDynamics::acceleration_tangent(const ParameterBlock& block, const La
   const StateLayout layout{data_.n};
   terms_.set_tangents(block, y_dir);
   solver_.solve(terms_.b_dir, terms_.c_dir, settings_.derivatives, z_dir_, lambda_dir_);
-  for (std::size_t k = 1; k < terms_.bodies.size(); ++k) {
-    const Vector4d& p = terms_.bodies[k].p;
+  for (std::size_t k = 1; k < terms_.frames.size(); ++k) {
+    const Vector4d& p = terms_.frames[k].p;
     const Lanes<3> w = z_dir_[k - 1].bottomRows<3>();
     a_dir.middleRows<3>(layout.q(k)) = z_dir_[k - 1].topRows<3>();
     // pddot' = (pddot' with omegadot fixed) + 1/2 G(p)' omegadot'
     auto out = a_dir.middleRows<4>(layout.p(k));
-    out = pddot_tangent(terms_.bodies[k], y_dir.middleRows<4>(layout.p(k)), y_dir.middleRows<4>(layout.pdot(k)));
+    out = pddot_tangent(terms_.frames[k], y_dir.middleRows<4>(layout.p(k)), y_dir.middleRows<4>(layout.pdot(k)));
     out.row(0) -= 0.5 * dot(p.tail<3>(), w);
     out.bottomRows<3>() += 0.5 * (p(0) * w + cross(p.tail<3>(), w));
   }
@@ -75,8 +75,8 @@ void SpatialDynamics::acceleration_tangent(const ParameterBlock& block, const La
 void SpatialDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar,
                                   Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar, const Motion* motion) {
   const StateLayout layout{data_.n};
-  for (std::size_t k = 1; k < terms_.bodies.size(); ++k) {
-    loads_bar_[k - 1] = to_virtual(terms_.bodies[k], w.segment<7>(layout.v(k)));
+  for (std::size_t k = 1; k < terms_.frames.size(); ++k) {
+    loads_bar_[k - 1] = to_virtual(terms_.frames[k], w.segment<7>(layout.v(k)));
     if (motion) loads_bar_[k - 1] += motion->z[k - 1];
     pddot_bar_[k] = w.segment<4>(layout.pdot(k));
   }

@@ -40,8 +40,8 @@ void StageEquations::residual(Eigen::Ref<Eigen::VectorXd> r) {
   for (int i = 1; i <= data_.n; ++i) b[at(i - 1)] -= dynamics_.solver().mass_times(i, terms_.z[at(i - 1)]);
   rows().subtract_transposed_times(terms_.lambda, b);
   terms_.acceleration_errors(mu_);
-  for (std::size_t k = 1; k < terms_.bodies.size(); ++k) {
-    const Vector4d &p = terms_.bodies[k].p, &pdot = terms_.bodies[k].pdot;
+  for (std::size_t k = 1; k < terms_.frames.size(); ++k) {
+    const Vector4d &p = terms_.frames[k].p, &pdot = terms_.frames[k].pdot;
     r.segment<6>(layout.q(k)) = b[k - 1];
     r(layout.q(k) + 6) = -p.dot(a_.segment<4>(layout.p(k))) - pdot.squaredNorm() * p.squaredNorm();
   }
@@ -53,7 +53,7 @@ void StageEquations::tangent(const ParameterBlock& block, const LaneRows& y_dir,
   terms_.set_tangents(block, y_dir);
   for (int i = 1; i <= data_.n; ++i) {
     const std::size_t k = at(i);
-    const Vector4d &p = terms_.bodies[k].p, &pdot = terms_.bodies[k].pdot;
+    const Vector4d &p = terms_.frames[k].p, &pdot = terms_.frames[k].pdot;
     const Vector4d a = a_.segment<4>(layout.p(i));
     const Lanes<4> p_dir = y_dir.middleRows<4>(layout.p(i)), pdot_dir = y_dir.middleRows<4>(layout.pdot(i));
     const double pp = p.squaredNorm(), vv = pdot.squaredNorm();
@@ -78,8 +78,8 @@ void StageEquations::add_adjoint(const Eigen::VectorXd& r_bar, Eigen::Ref<Eigen:
     z_bar_[at(i - 1)] = -dynamics_.solver().mass_times(i, eta_[at(i - 1)]);
   }
   rows().subtract_transposed_times(mu_, z_bar_);  // z_bar = -(M eta + J'mu)
-  for (std::size_t k = 1; k < terms_.bodies.size(); ++k) {
-    const Vector4d &p = terms_.bodies[k].p, &pdot = terms_.bodies[k].pdot;
+  for (std::size_t k = 1; k < terms_.frames.size(); ++k) {
+    const Vector4d &p = terms_.frames[k].p, &pdot = terms_.frames[k].pdot;
     const Vector4d a = a_.segment<4>(layout.p(k));
     const Vector3d w_bar = z_bar_[k - 1].tail<3>();
     const double r_p = r_bar(layout.q(k) + 6), pp = p.squaredNorm();
@@ -99,7 +99,7 @@ Mat<6, 6> StageEquations::mass(int body) const {
 }
 
 Mat<7, 7> StageEquations::mass_block(int body) const {
-  const Vector4d& p = terms_.bodies[at(body)].p;
+  const Vector4d& p = terms_.frames[at(body)].p;
   const Mat<6, 6> M = mass(body);
   Mat<7, 7> X = Mat<7, 7>::Zero();
   X.topLeftCorner<6, 3>() = M.leftCols<3>();
@@ -109,13 +109,13 @@ Mat<7, 7> StageEquations::mass_block(int body) const {
 }
 
 Mat<3, 4> StageEquations::omegadot_by_p(int body) const {
-  const Vector4d& p = terms_.bodies[at(body)].p;
+  const Vector4d& p = terms_.frames[at(body)].p;
   const Vector4d a = a_.segment<4>(StateLayout{data_.n}.p(body));
   return (-2 / p.squaredNorm()) * (G(a) + terms_.z[at(body - 1)].tail<3>() * p.transpose());
 }
 
 void StageEquations::add_fixed_a(int body, Mat<7, 7>& q, Mat<7, 7>& v) const {
-  const Vector4d &p = terms_.bodies[at(body)].p, &pdot = terms_.bodies[at(body)].pdot;
+  const Vector4d &p = terms_.frames[at(body)].p, &pdot = terms_.frames[at(body)].pdot;
   const Vector4d a = a_.segment<4>(StateLayout{data_.n}.p(body));
   q.block<6, 4>(0, 3) += mass(body).rightCols<3>() * omegadot_by_p(body);
   q.block<1, 4>(6, 3) = (a + 2 * pdot.squaredNorm() * p).transpose();
@@ -123,7 +123,7 @@ void StageEquations::add_fixed_a(int body, Mat<7, 7>& q, Mat<7, 7>& v) const {
 }
 
 Mat<1, 7> StageEquations::times_Z(int body, const Mat<1, 6>& J_row) const {
-  const Vector4d& p = terms_.bodies[at(body)].p;
+  const Vector4d& p = terms_.frames[at(body)].p;
   Mat<1, 7> x;
   x.head<3>() = J_row.head<3>();
   x.tail<4>() = (2 / p.squaredNorm()) * G_transposed_times(p, J_row.tail<3>().transpose()).transpose();

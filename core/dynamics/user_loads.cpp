@@ -77,7 +77,7 @@ void UserLoads::set_L_rho(const UserForceData& f, const Accelerations& z) {
   f.force->inertia()->L_rho(q_.head(7), v_.head(7), z_, data_.rho, L_rho_);
 }
 
-void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, std::vector<Vec<6>>& loads) {
+void UserLoads::add_loads(const ForceTerms::At& at, std::vector<Vec<6>>& loads) {
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
     set_state(f, at.y);
@@ -91,13 +91,13 @@ void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, std::v
     f.force->Q(at.t, q_.head(size), v_.head(size), data_.rho, Q_.head(size));
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
       const std::size_t body = static_cast<std::size_t>(f.bodies[k]);
-      loads[body] += to_virtual(bodies[body], Q_.segment<7>(block_of(k)));
+      loads[body] += to_virtual(at.frames[body], Q_.segment<7>(block_of(k)));
     }
   }
 }
 
 // (T'Q)_y' = T'(-K q' - C v') + (0, 1/2 G(p') Q_p)
-void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z, MotionBlocks& out) {
+void UserLoads::add_blocks(const ForceTerms::At& at, const Accelerations& z, MotionBlocks& out) {
   constexpr int all = MotionBlocks::r | MotionBlocks::p | MotionBlocks::rdot | MotionBlocks::pdot;
   for (const UserForceData& f : data_.user_forces) {
     evaluate(f, at, z);
@@ -108,7 +108,7 @@ void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, const
     }
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
       const Eigen::Index row = block_of(k);
-      const BodyState& body = bodies[static_cast<std::size_t>(f.bodies[k])];
+      const BodyState& body = at.frames[static_cast<std::size_t>(f.bodies[k])];
       for (std::size_t l = 0; l < f.bodies.size(); ++l) {
         const Eigen::Index column = block_of(l);
         MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(f.bodies[k], f.bodies[l]))];
@@ -124,8 +124,8 @@ void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, const
   }
 }
 
-void UserLoads::add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
-                                  const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs) {
+void UserLoads::add_field_tangent(const ForceTerms::At& at, const Accelerations& z, const ParameterBlock& block,
+                                  std::vector<Lanes<6>>& load_dirs) {
   if (std::all_of(std::begin(block.parameter), std::end(block.parameter), [](int k) { return k < 0; })) return;
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
@@ -140,15 +140,14 @@ void UserLoads::add_field_tangent(const ForceTerms::At& at, const Bodies& bodies
       for (std::size_t k = 0; k < f.bodies.size(); ++k) {
         const std::size_t body = static_cast<std::size_t>(f.bodies[k]);
         load_dirs[body].col(lane) +=
-            to_virtual(bodies[body], Q_rho_.col(block.parameter[lane]).segment<7>(block_of(k)));
+            to_virtual(at.frames[body], Q_rho_.col(block.parameter[lane]).segment<7>(block_of(k)));
       }
     }
   }
 }
 
-void UserLoads::add_pull_back(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
-                              const std::vector<Vec<6>>& eta, Eigen::Ref<Eigen::VectorXd> y_bar,
-                              Eigen::VectorXd& rho_bar) {
+void UserLoads::add_pull_back(const ForceTerms::At& at, const Accelerations& z, const std::vector<Vec<6>>& eta,
+                              Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar) {
   const StateLayout layout{data_.n};
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
@@ -157,7 +156,7 @@ void UserLoads::add_pull_back(const ForceTerms::At& at, const Bodies& bodies, co
       const Eigen::Index own = block_of(k);
       const std::size_t body = static_cast<std::size_t>(f.bodies[k]);
       e_.segment<3>(own) = eta[body - 1].head<3>();
-      e_.segment<4>(own + 3) = 0.5 * G_transposed_times(bodies[body].p, eta[body - 1].tail<3>());
+      e_.segment<4>(own + 3) = 0.5 * G_transposed_times(at.frames[body].p, eta[body - 1].tail<3>());
     }
     Q_rho_.setZero();
     f.force->Q_rho(at.t, q_.head(size), v_.head(size), data_.rho, Q_rho_.topRows(size));

@@ -17,17 +17,16 @@ class UserLoads {
  public:
   explicit UserLoads(const MechanismData& data);
 
-  using Bodies = std::vector<BodyState>;  // the ground first
   // The accelerations z per body without the ground. Derivatives of mass terms are those of -M z - h, loads are -h.
   using Accelerations = std::vector<Vec<6>>;
-  void add_loads(const ForceTerms::At& at, const Bodies& bodies, std::vector<Vec<6>>& loads);
+  void add_loads(const ForceTerms::At& at, std::vector<Vec<6>>& loads);
   // Derivatives of the loads in the state as blocks, and in the directions of the parameters.
-  void add_blocks(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z, MotionBlocks& out);
-  void add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
-                         const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
+  void add_blocks(const ForceTerms::At& at, const Accelerations& z, MotionBlocks& out);
+  void add_field_tangent(const ForceTerms::At& at, const Accelerations& z, const ParameterBlock& block,
+                         std::vector<Lanes<6>>& load_dirs);
   // Adds the gradient of the virtual work sum load'eta; eta is per body, without the ground.
-  void add_pull_back(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
-                     const std::vector<Vec<6>>& eta, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
+  void add_pull_back(const ForceTerms::At& at, const Accelerations& z, const std::vector<Vec<6>>& eta,
+                     Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
 
   // M of each mass term at a state.
   void set_masses(const Eigen::VectorXd& y);

@@ -11,7 +11,7 @@ namespace mbsopt {
 BodyAt moving(const StatePoint& at, int body) {
   assert(at.motion);
   BodyAt b = body_at(at.y, body);
-  if (body > 0) set_acceleration(at.motion->motion(at).z[static_cast<std::size_t>(body - 1)], b.state, b.frame);
+  if (body > 0) set_acceleration(at.motion->motion(at).z[static_cast<std::size_t>(body - 1)], b.frame);
   return b;
 }
 

@@ -205,8 +205,7 @@ class Loops {
   template <class F>
   void for_each_equation(const VectorXd& q, F&& f) const {
     std::vector<Frame> frames(at(d_.n) + 1);
-    BodyState state;
-    for (int i = 1; i <= d_.n; ++i) set_position(q.segment<7>(7 * (i - 1)), state, frames[at(i)]);
+    for (int i = 1; i <= d_.n; ++i) set_position(q.segment<7>(7 * (i - 1)), frames[at(i)]);
     Index row = 0;
     for (const Constraint& c : moved_) {
       const double unit = c.quantity() == RowQuantity::length ? 1 / lengths_.whole : 1;

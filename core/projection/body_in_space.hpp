@@ -32,34 +32,44 @@ class BodyInSpace {
     norm_hat_ = positions_ ? p_hat.norm() : 1.0;
     Vec<7> q;
     q << r_hat_, p_hat / norm_hat_;
-    set_position(q, tilde_, tilde);
+    set_position(q, tilde);
+    tilde_ = tilde;
   }
   void displace(const Vec<6>& delta, Frame& f) {
     const Vector4d pi = tilde_.p + 0.5 * G_transposed_times(tilde_.p, delta.tail<3>());
     norm_pi_ = positions_ ? pi.norm() : 1.0;
     Vec<7> q;
     q << r_hat_ + delta.head<3>(), pi / norm_pi_;
-    set_position(q, state_, f);
+    set_position(q, f);
+    state_ = f;
   }
   // Sets the velocities for u = 0, and changes u by du.
   void start_velocity(Frame& f) {
     const Vector4d pdot_hat = v_hat_.tail<4>(), &p = state_.p;
     Vec<7> v;
     v << v_hat_.head<3>(), pdot_hat - p * (p.dot(pdot_hat) / p.squaredNorm());
-    set_velocity(v, state_, f);
+    set_velocity(v, f);
+    state_ = f;
   }
   void add_velocity(const Vec<6>&, const Vec<6>& du, Frame& f) {
     Vec<7> v;
     v << f.rdot + du.head<3>(), state_.pdot + 0.5 * G_transposed_times(state_.p, du.tail<3>());
-    set_velocity(v, state_, f);
+    set_velocity(v, f);
+    state_ = f;
   }
   void write(const Frame& f, Eigen::VectorXd& y) const {
     y.segment<7>(q_) << f.r, state_.p;
     y.segment<7>(v_) << f.rdot, state_.pdot;
   }
 
-  void read_position(const Eigen::VectorXd& y, Frame& f) { set_position(y.segment<7>(q_), state_, f); }
-  void read_velocity(const Eigen::VectorXd& y, Frame& f) { set_velocity(y.segment<7>(v_), state_, f); }
+  void read_position(const Eigen::VectorXd& y, Frame& f) {
+    set_position(y.segment<7>(q_), f);
+    state_ = f;
+  }
+  void read_velocity(const Eigen::VectorXd& y, Frame& f) {
+    set_velocity(y.segment<7>(v_), f);
+    state_ = f;
+  }
   double norm_violation() const { return std::abs(UnitNorm::phi(state_.p)); }
   double norm_rate_violation() const { return std::abs(UnitNorm::phi_dot(state_.p, state_.pdot)); }
 

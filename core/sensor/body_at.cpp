@@ -8,8 +8,9 @@ BodyAt body_at(const Eigen::VectorXd& y, int body) {
   BodyAt b;
   if (body == 0) return b;
   const StateLayout layout = StateLayout::of(y);
-  set_position(y.segment<7>(layout.q(body)), b.state, b.frame);
-  set_velocity(y.segment<7>(layout.v(body)), b.state, b.frame);
+  set_position(y.segment<7>(layout.q(body)), b.frame);
+  set_velocity(y.segment<7>(layout.v(body)), b.frame);
+  b.state = b.frame;
   return b;
 }
 
@@ -18,8 +19,9 @@ BodiesAt::BodiesAt(const Eigen::VectorXd& y) {
   states.resize(at(layout.n) + 1);
   frames.resize(states.size());
   for (std::size_t k = 1; k < states.size(); ++k) {
-    set_position(y.segment<7>(layout.q(k)), states[k], frames[k]);
-    set_velocity(y.segment<7>(layout.v(k)), states[k], frames[k]);
+    set_position(y.segment<7>(layout.q(k)), frames[k]);
+    set_velocity(y.segment<7>(layout.v(k)), frames[k]);
+    states[k] = frames[k];
   }
 }
 

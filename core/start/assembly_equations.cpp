@@ -272,10 +272,10 @@ AssemblyEquations::Gradients AssemblyEquations::second(const VectorXd& y, const 
   at_rest.tail(N).setZero();
   BodiesAt bodies(at_rest);
   for (int i = 1; i <= data_.n; ++i) {
-    BodyState& state = bodies.states[at(i)];
     Frame& frame = bodies.frames[at(i)];
     for (Index j = layout.q(i); j < layout.q(i) + 7; ++j) {
-      set_velocity(Vec<7>::Unit(j - layout.q(i)), state, frame);
+      set_velocity(Vec<7>::Unit(j - layout.q(i)), frame);
+      bodies.states[at(i)] = frame;
       for_joint_gradients(
           AssemblyLevel::velocity, bodies, i,
           [&](Index row, Index column, double value) {
@@ -285,7 +285,7 @@ AssemblyEquations::Gradients AssemblyEquations::second(const VectorXd& y, const 
             FieldGradient{data_.theta_rho, data_.active, nu(row), rho_bars.col(j)}.add(slot, bar);
           });
     }
-    set_velocity(Vec<7>::Zero(), state, frame);
+    set_velocity(Vec<7>::Zero(), frame);
   }
   out.rho = rho_bars.transpose();
   Index row = data_.m;

@@ -404,14 +404,13 @@ TEST_CASE("MBSVT: Jacob and its products, at a state", "[mbsvt]") {
   const Mechanism mechanism(scene, kRho);
   const MechanismData& data = mechanism.data();
   const Assembly assembly(mechanism, 0);
-  std::vector<BodyState> bodies(4);
   std::vector<Frame> frames(4);  // frames[0]: the ground
   std::vector<Vec<6>> velocity(3);
   for (int i = 1; i <= 3; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
-    set_position(assembly.result().y.segment<7>(7 * (i - 1)), bodies[k], frames[k]);
-    set_velocity(assembly.result().y.segment<7>(21 + 7 * (i - 1)), bodies[k], frames[k]);
-    velocity[k - 1] << frames[k].rdot, bodies[k].omega();
+    set_position(assembly.result().y.segment<7>(7 * (i - 1)), frames[k]);
+    set_velocity(assembly.result().y.segment<7>(21 + 7 * (i - 1)), frames[k]);
+    velocity[k - 1] << frames[k].rdot, frames[k].omega();
   }
   ConstraintRows J(data);
   J.evaluate(frames);

@@ -11,7 +11,6 @@ using Eigen::VectorXd;
 namespace {
 
 struct Moving {
-  BodyState state;
   Frame frame;
   Vec<7> q, v;
   Vec<6> z, eta;
@@ -20,9 +19,9 @@ struct Moving {
 Moving moving(Random& random) {
   Moving b;
   b.q = random.vector(7), b.v = random.vector(7), b.z = random.vector(6), b.eta = random.vector(6);
-  set_position(b.q, b.state, b.frame);
-  set_velocity(b.v, b.state, b.frame);
-  set_acceleration(b.z, b.state, b.frame);
+  set_position(b.q, b.frame);
+  set_velocity(b.v, b.frame);
+  set_acceleration(b.z, b.frame);
   set_virtual(b.eta, b.frame);
   return b;
 }
@@ -119,7 +118,7 @@ TEST_CASE("pull-backs of a frame equal complex-step gradients", "[body]") {
   const Vector4d w_p = random.vector(4);
   SECTION("all of it, for the adjoint sweep") {
     Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
-    add_pull_back(b.state, bar, w_p, b.eta.tail<3>(), q_bar, v_bar);
+    add_pull_back(b.frame, bar, w_p, b.eta.tail<3>(), q_bar, v_bar);
     VectorXd found(14);
     found << q_bar, v_bar;
     const VectorXd expected =
@@ -130,7 +129,7 @@ TEST_CASE("pull-backs of a frame equal complex-step gradients", "[body]") {
     FrameBar some = bar;
     some.Addot.setZero(), some.A_eta.setZero(), some.pddot.setZero(), some.p_eta.setZero();
     Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
-    add_pull_back_velocity(b.state, some, 0.7, q_bar, v_bar);
+    add_pull_back_velocity(b.frame, some, 0.7, q_bar, v_bar);
     VectorXd found(14);
     found << q_bar, v_bar;
     const VectorXd expected = complex_gradient(
@@ -139,7 +138,7 @@ TEST_CASE("pull-backs of a frame equal complex-step gradients", "[body]") {
     some.rdot.setZero(), some.Adot.setZero(), some.pdot.setZero();
     const VectorXd position = complex_gradient(
         [&](const std::vector<Complex>& x) { return weighted_frame(x, b, some, Vector4d::Zero()); }, packed(b));
-    CHECK((pull_back_position(b.state, some) - position.head<7>()).lpNorm<Eigen::Infinity>() < 1e-13);
+    CHECK((pull_back_position(b.frame, some) - position.head<7>()).lpNorm<Eigen::Infinity>() < 1e-13);
   }
 }
 
@@ -150,11 +149,11 @@ TEST_CASE("the tangent of a frame is the transpose of its pull-back", "[body]") 
   bar.A_eta.setZero(), bar.p_eta.setZero();
   const Vector4d w_p = random.vector(4);
   Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
-  add_pull_back(b.state, bar, w_p, b.eta.tail<3>(), q_bar, v_bar);
+  add_pull_back(b.frame, bar, w_p, b.eta.tail<3>(), q_bar, v_bar);
   const Lanes<7> q_dir = random.vector(7 * kLanes).reshaped(7, kLanes);
   const Lanes<7> v_dir = random.vector(7 * kLanes).reshaped(7, kLanes);
   FrameTangent t;
-  set_tangent(b.state, q_dir, v_dir, t);
+  set_tangent(b.frame, q_dir, v_dir, t);
   for (int lane = 0; lane < kLanes; ++lane) {
     double forward = bar.r.dot(t.r.col(lane)) + bar.rdot.dot(t.rdot.col(lane)) + w_p.dot(t.pddot.col(lane)) +
                      bar.p.dot(t.p.col(lane)) + bar.pdot.dot(t.pdot.col(lane)) + bar.pddot.dot(t.pddot.col(lane));
@@ -170,7 +169,8 @@ TEST_CASE("to_virtual is the transpose of the map from (rddot, omegadot) to (rdd
   Random random(GENERATE(range(0u, 4u)));
   const Moving b = moving(random);
   const Vec<7> w = random.vector(7);
-  Vec<7> at_rest = acceleration(b.state, b.frame);
-  at_rest.tail<4>() += b.state.pdot.squaredNorm() * b.state.p;  // the part linear in z
-  CHECK(w.dot(at_rest) == Approx(to_virtual(b.state, w).dot(b.z)).margin(1e-13));
+  Vec<7> at_rest;
+  at_rest << b.frame.rddot, b.frame.pddot;
+  at_rest.tail<4>() += b.frame.pdot.squaredNorm() * b.frame.p;  // the part linear in z
+  CHECK(w.dot(at_rest) == Approx(to_virtual(b.frame, w).dot(b.z)).margin(1e-13));
 }

@@ -76,7 +76,6 @@ struct Case {
   VectorXd x;
   Vec<6> z1, z2, eta1, eta2;
   Multipliers<m> weights;
-  BodyState b1, b2;
   Frame f1, f2;
 
   explicit Case(unsigned seed) {
@@ -90,8 +89,8 @@ struct Case {
     if constexpr (requires { primitive.s1; }) primitive.s1 = at.segment<3>(28), primitive.s2 = at.segment<3>(31);
     if constexpr (requires { primitive.s3; }) primitive.s3 = at.segment<3>(34);
     if constexpr (std::is_same_v<P, Coordinate>) primitive.index = 5;
-    set(at, 0, z1, eta1, b1, f1);
-    set(at, 14, z2, eta2, b2, f2);
+    set(at, 0, z1, eta1, f1);
+    set(at, 14, z2, eta2, f2);
   }
 
   // Phi, Phidot, Phiddot and J eta by power series.
@@ -148,17 +147,17 @@ struct Case {
     GeometryBar s;
     primitive.pull_back(f1, f2, w, bar1, bar2, s);
     VectorXd g = VectorXd::Zero(37);
-    add_pull_back(b1, bar1, Vector4d::Zero(), eta1.template tail<3>(), g.segment<7>(0), g.segment<7>(7));
-    add_pull_back(b2, bar2, Vector4d::Zero(), eta2.template tail<3>(), g.segment<7>(14), g.segment<7>(21));
+    add_pull_back(f1, bar1, Vector4d::Zero(), eta1.template tail<3>(), g.segment<7>(0), g.segment<7>(7));
+    add_pull_back(f2, bar2, Vector4d::Zero(), eta2.template tail<3>(), g.segment<7>(14), g.segment<7>(21));
     g.segment<3>(28) = s.s1, g.segment<3>(31) = s.s2, g.segment<3>(34) = s.s3;
     return g;
   }
 
  private:
-  static void set(const VectorXd& at, int first, const Vec<6>& z, const Vec<6>& eta, BodyState& b, Frame& f) {
-    set_position(at.segment<7>(first), b, f);
-    set_velocity(at.segment<7>(first + 7), b, f);
-    set_acceleration(z, b, f);
+  static void set(const VectorXd& at, int first, const Vec<6>& z, const Vec<6>& eta, Frame& f) {
+    set_position(at.segment<7>(first), f);
+    set_velocity(at.segment<7>(first + 7), f);
+    set_acceleration(z, f);
     set_virtual(eta, f);
   }
   template <class T>
@@ -244,8 +243,8 @@ TEMPLATE_TEST_CASE("a primitive's tangent is its derivative along any direction"
   Random random(seed + 100);
   const Eigen::MatrixXd directions = random.vector(37 * kLanes).reshaped(37, kLanes);
   FrameTangent t1, t2;
-  set_tangent(c.b1, directions.middleRows<7>(0), directions.middleRows<7>(7), t1);
-  set_tangent(c.b2, directions.middleRows<7>(14), directions.middleRows<7>(21), t2);
+  set_tangent(c.f1, directions.middleRows<7>(0), directions.middleRows<7>(7), t1);
+  set_tangent(c.f2, directions.middleRows<7>(14), directions.middleRows<7>(21), t2);
   const Lanes<3> s1 = directions.middleRows<3>(28), s2 = directions.middleRows<3>(31),
                  s3 = directions.middleRows<3>(34);
   const bool with_geometry = GENERATE(true, false);
@@ -285,9 +284,9 @@ TEMPLATE_TEST_CASE("the blocks of a primitive that sees only turning are its tan
   const Case<TestType> c(seed);
   constexpr int m = TestType::kRows;
   TurningBlocks<m> found;
-  c.primitive.turning_blocks(c.b1, c.f1, c.b2, c.f2, c.weights.lambda, found);
+  c.primitive.turning_blocks(c.f1, c.f2, c.weights.lambda, found);
   UnitTangents u1, u2;
-  set_unit_tangents(c.b1, u1), set_unit_tangents(c.b2, u2);
+  set_unit_tangents(c.f1, u1), set_unit_tangents(c.f2, u2);
   const FrameTangent still = FrameTangent::zero();
   auto tangent = [&](const FrameTangent& t1, const FrameTangent& t2) {
     PrimitiveTangent<m> x;

@@ -110,14 +110,13 @@ TEST_CASE("accelerations equal a dense solution of the constrained equations", "
   REQUIRE(dynamics.evaluate(kTime, y, angles, rate));
   // Dense: M, J from the rows; gamma by second differences of Phi along the motion with z = 0; planar loops are
   // redundant.
-  std::vector<BodyState> states(4);
   std::vector<Frame> frames(4);
   const Vec<6> none = Vec<6>::Zero();
   for (int i = 1; i <= 3; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
-    set_position(y.segment<7>(7 * (i - 1)), states[k], frames[k]);
-    set_velocity(y.segment<7>(21 + 7 * (i - 1)), states[k], frames[k]);
-    set_acceleration(none, states[k], frames[k]);
+    set_position(y.segment<7>(7 * (i - 1)), frames[k]);
+    set_velocity(y.segment<7>(21 + 7 * (i - 1)), frames[k]);
+    set_acceleration(none, frames[k]);
   }
   VectorXd gamma(d.m);
   RowLaws laws(d);
@@ -128,7 +127,7 @@ TEST_CASE("accelerations equal a dense solution of the constrained equations", "
     const BodyData& b = d.bodies[static_cast<std::size_t>(i)];
     M.block<3, 3>(6 * i - 6, 6 * i - 6) = b.mass * Matrix3d::Identity();
     M.block<3, 3>(6 * i - 3, 6 * i - 3) = b.J;
-    const Vector3d omega = states[static_cast<std::size_t>(i)].omega();
+    const Vector3d omega = frames[static_cast<std::size_t>(i)].omega();
     f.segment<3>(6 * i - 6) = b.mass * d.gravity;
     f.segment<3>(6 * i - 3) = -omega.cross(b.J * omega);
   }

@@ -63,7 +63,6 @@ struct DryFriction {
 struct Bodies {
   Eigen::VectorXd x;
   Vec<6> eta1, eta2;
-  BodyState b1, b2;
   Frame f1, f2;
 
   Bodies(unsigned seed, Eigen::Index inputs) {
@@ -72,8 +71,8 @@ struct Bodies {
     eta1 = random.vector(6), eta2 = random.vector(6);
   }
   void place() {
-    set(0, eta1, b1, f1);
-    set(14, eta2, b2, f2);
+    set(0, eta1, f1);
+    set(14, eta2, f2);
   }
   template <class T>
   TextbookBody<T> textbook(const std::vector<T>& at, std::size_t first) const {
@@ -84,9 +83,9 @@ struct Bodies {
   }
 
  private:
-  void set(int first, const Vec<6>& eta, BodyState& b, Frame& f) const {
-    set_position(x.segment<7>(first), b, f);
-    set_velocity(x.segment<7>(first + 7), b, f);
+  void set(int first, const Vec<6>& eta, Frame& f) const {
+    set_position(x.segment<7>(first), f);
+    set_velocity(x.segment<7>(first + 7), f);
     set_virtual(eta, f);
   }
 };
@@ -123,9 +122,9 @@ C moved(const C& c, const Eigen::VectorXd& to) {
 }
 
 // (rdot, omega_B) as a virtual displacement: what multiplies loads to power. Needs p'pdot = 0.
-inline Vec<6> rigid_velocity(const BodyState& b, const Frame& f) {
+inline Vec<6> rigid_velocity(const Frame& f) {
   Vec<6> eta;
-  eta << f.rdot, b.omega() / b.p.squaredNorm();
+  eta << f.rdot, f.omega() / f.p.squaredNorm();
   return eta;
 }
 

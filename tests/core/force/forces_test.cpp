@@ -34,8 +34,8 @@ TEMPLATE_TEST_CASE("a force's pull-back is the gradient of its virtual work", "[
   VectorXd theta_bar = VectorXd::Zero(fields), rho_bar = VectorXd::Zero(TestType::kParameters);
   c.pull_back(bar1, bar2, theta_bar, rho_bar);
   VectorXd found = VectorXd::Zero(TestType::kInputs);
-  add_pull_back(c.b1, bar1, Vector4d::Zero(), c.eta1.template tail<3>(), found.segment<7>(0), found.segment<7>(7));
-  add_pull_back(c.b2, bar2, Vector4d::Zero(), c.eta2.template tail<3>(), found.segment<7>(14), found.segment<7>(21));
+  add_pull_back(c.f1, bar1, Vector4d::Zero(), c.eta1.template tail<3>(), found.segment<7>(0), found.segment<7>(7));
+  add_pull_back(c.f2, bar2, Vector4d::Zero(), c.eta2.template tail<3>(), found.segment<7>(14), found.segment<7>(21));
   found.segment(28, fields) = theta_bar;
   found.tail(rho_bar.size()) = rho_bar;
   const VectorXd complex_step = complex_gradient([&](const std::vector<Complex>& at) { return c.work(at); }, c.x);
@@ -56,8 +56,8 @@ TEMPLATE_TEST_CASE("a force's tangent is the derivative of its loads along any d
   Random random(seed + 100);
   const Eigen::MatrixXd directions = random.vector(TestType::kInputs * kLanes).reshaped(TestType::kInputs, kLanes);
   FrameTangent t1, t2;
-  set_tangent(c.b1, directions.middleRows<7>(0), directions.middleRows<7>(7), t1);
-  set_tangent(c.b2, directions.middleRows<7>(14), directions.middleRows<7>(21), t2);
+  set_tangent(c.f1, directions.middleRows<7>(0), directions.middleRows<7>(7), t1);
+  set_tangent(c.f2, directions.middleRows<7>(14), directions.middleRows<7>(21), t2);
   const LoadTangents found = c.tangent(t1, t2, directions);
   for (int lane = 0; lane < kLanes; ++lane) {
     for (int i = 0; i < 12; ++i) {
@@ -102,9 +102,9 @@ TEST_CASE("a spring without damping is the gradient of its potential", "[force]"
     // Along q' = (eta_r, 1/2 G'eta_theta) the potential 1/2 k stretch^2 falls by the work of the loads.
     VectorXd direction = VectorXd::Zero(c.x.size());
     direction.segment(0, 3) = c.eta1.template head<3>();
-    direction.segment(3, 4) = 0.5 * G_transposed_times(c.b1.p, c.eta1.template tail<3>());
+    direction.segment(3, 4) = 0.5 * G_transposed_times(c.f1.p, c.eta1.template tail<3>());
     direction.segment(14, 3) = c.eta2.template head<3>();
-    direction.segment(17, 4) = 0.5 * G_transposed_times(c.b2.p, c.eta2.template tail<3>());
+    direction.segment(17, 4) = 0.5 * G_transposed_times(c.f2.p, c.eta2.template tail<3>());
     auto potential = [&](const VectorXd& at) { return 0.5 * at(c.kLaw) * stretch_squared(moved(c, at)); };
     auto slope = [&](double h) { return (potential(c.x + h * direction) - potential(c.x - h * direction)) / (2 * h); };
     const double change = (4 * slope(5e-4) - slope(1e-3)) / 3;
@@ -130,8 +130,7 @@ TEST_CASE("power of a spring-damper is minus its force times its rate", "[force]
     }
     c.place();
     const Loads l = c.loads();
-    CHECK(l.load1.dot(rigid_velocity(c.b1, c.f1)) + l.load2.dot(rigid_velocity(c.b2, c.f2)) ==
-          Approx(power(c)).margin(1e-11));
+    CHECK(l.load1.dot(rigid_velocity(c.f1)) + l.load2.dot(rigid_velocity(c.f2)) == Approx(power(c)).margin(1e-11));
   };
   check(TsdaCase<LinearLaw>(seed), [](const TsdaCase<LinearLaw>& c) {
     const auto s = c.force.span(c.f1, c.f2);
@@ -161,7 +160,7 @@ TEST_CASE("a bushing without damping is the gradient of its potential, and that 
   VectorXd theta_bar = VectorXd::Zero(fields), found = VectorXd::Zero(c.kInputs);
   FieldGradient gradient{theta_rho, active, 1, theta_bar};
   c.force.pull_back_potential({}, c.f1, c.f2, bar1, bar2, gradient);
-  found.segment<7>(0) = pull_back_position(c.b1, bar1), found.segment<7>(14) = pull_back_position(c.b2, bar2);
+  found.segment<7>(0) = pull_back_position(c.f1, bar1), found.segment<7>(14) = pull_back_position(c.f2, bar2);
   found.segment(28, fields) = theta_bar;
   const VectorXd expected = complex_gradient([&](const std::vector<Complex>& x) { return c.potential(x); }, c.x);
   CHECK(distance(found, expected) < 1e-12 * (1 + expected.lpNorm<Eigen::Infinity>()));
@@ -169,7 +168,7 @@ TEST_CASE("a bushing without damping is the gradient of its potential, and that 
   const Loads l = c.loads();  // along q' = (eta_r, 1/2 G'eta_theta)
   VectorXd direction = VectorXd::Zero(c.kInputs);
   direction.segment<3>(0) = c.eta1.head<3>(), direction.segment<3>(14) = c.eta2.head<3>();
-  direction.segment<4>(3) = 0.5 * G_transposed_times(c.b1.p, c.eta1.tail<3>());
-  direction.segment<4>(17) = 0.5 * G_transposed_times(c.b2.p, c.eta2.tail<3>());
+  direction.segment<4>(3) = 0.5 * G_transposed_times(c.f1.p, c.eta1.tail<3>());
+  direction.segment<4>(17) = 0.5 * G_transposed_times(c.f2.p, c.eta2.tail<3>());
   CHECK(l.load1.dot(c.eta1) + l.load2.dot(c.eta2) == Approx(-expected.dot(direction)).epsilon(1e-12));
 }
