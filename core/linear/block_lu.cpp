@@ -46,40 +46,37 @@ bool BlockLu::factor() {
 }
 
 void BlockLu::solve(Eigen::Ref<Eigen::MatrixXd> x) const {
-  for (Eigen::Index c = 0; c < x.cols(); ++c) solve_column(x.col(c).data());
+  for (Eigen::Index c = 0; c < x.cols(); ++c) solve_column<false>(x.col(c).data());
 }
 
 void BlockLu::solve_transposed(Eigen::Ref<Eigen::MatrixXd> x) const {
-  for (Eigen::Index c = 0; c < x.cols(); ++c) solve_column_transposed(x.col(c).data());
+  for (Eigen::Index c = 0; c < x.cols(); ++c) solve_column<true>(x.col(c).data());
 }
 
+// A = L U and A' = U'L': the blocks below the diagonal and above it change places.
+template <bool Transposed>
 void BlockLu::solve_column(double* x) const {
   const std::vector<int>& order = elimination_.order;
-  auto of = [&](std::size_t position) { return x + order[position] * stride_; };
+  const auto of = [&](std::size_t position) { return x + order[position] * stride_; };
   for (std::size_t k = 0; k < order.size(); ++k) {
-    kernels_->solve_lower(block(k), exchanged_of(k), of(k));
-    for (const auto& e : elimination_.columns[k]) kernels_->subtract_times(block(lower(e.block)), of(k), of(at(e.row)));
+    if (Transposed) {
+      kernels_->solve_upper_transposed(block(k), inverse_of(k), of(k));
+    } else {
+      kernels_->solve_lower(block(k), exchanged_of(k), of(k));
+    }
+    for (const auto& e : elimination_.columns[k]) {
+      kernels_->subtract_times(block(Transposed ? upper(e.block) : lower(e.block)), of(k), of(at(e.row)));
+    }
   }
   for (std::size_t k = order.size(); k-- > 0;) {
     for (const auto& e : elimination_.columns[k]) {
-      kernels_->subtract_transposed_times(block(upper(e.block)), of(at(e.row)), of(k));
+      kernels_->subtract_transposed_times(block(Transposed ? lower(e.block) : upper(e.block)), of(at(e.row)), of(k));
     }
-    kernels_->solve_upper(block(k), inverse_of(k), of(k));
-  }
-}
-
-void BlockLu::solve_column_transposed(double* x) const {
-  const std::vector<int>& order = elimination_.order;
-  auto of = [&](std::size_t position) { return x + order[position] * stride_; };
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    kernels_->solve_upper_transposed(block(k), inverse_of(k), of(k));
-    for (const auto& e : elimination_.columns[k]) kernels_->subtract_times(block(upper(e.block)), of(k), of(at(e.row)));
-  }
-  for (std::size_t k = order.size(); k-- > 0;) {
-    for (const auto& e : elimination_.columns[k]) {
-      kernels_->subtract_transposed_times(block(lower(e.block)), of(at(e.row)), of(k));
+    if (Transposed) {
+      kernels_->solve_lower_transposed(block(k), exchanged_of(k), of(k));
+    } else {
+      kernels_->solve_upper(block(k), inverse_of(k), of(k));
     }
-    kernels_->solve_lower_transposed(block(k), exchanged_of(k), of(k));
   }
 }
 

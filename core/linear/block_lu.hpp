@@ -53,8 +53,8 @@ class BlockLu {
   Eigen::Index stride() const { return stride_; }
 
  private:
+  template <bool Transposed>
   void solve_column(double* x) const;
-  void solve_column_transposed(double* x) const;
 
   double* block(std::size_t k) { return values_.data() + k * size_; }
   const double* block(std::size_t k) const { return values_.data() + k * size_; }
