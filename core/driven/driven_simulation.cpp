@@ -112,10 +112,7 @@ class DrivenDerivatives {
     if (!linearise(at)) return false;
     const Eigen::Index rows = velocities ? y_rho_.rows() : y_rho_.rows() / 2;
     for (const ParameterBlock& b : blocks_) {
-      if (velocities)
-        projector_.tangent(b, y0_dir_, direction_);
-      else
-        projector_.position_tangent(b, y0_dir_, direction_);
+      projector_.tangent(b, y0_dir_, direction_, velocities);
       for (int k = 0; k < kLanes; ++k)
         if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]).head(rows) = direction_.col(k).head(rows);
     }

@@ -54,9 +54,9 @@ class Projector {
   // Prepares derivatives at an earlier projection (also of another Projector of the same mechanism).
   virtual bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat,
                          const Eigen::VectorXd& y, const ProjectionSolution& solution) = 0;
-  virtual void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) = 0;
-  // The tangent of positions alone; the rows of velocities are undefined.
-  virtual void position_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) = 0;
+  // Without velocities, their rows are undefined.
+  virtual void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir,
+                       bool velocities = true) = 0;
   // y_hat_bar += (dy/dy_hat)' y_bar, and the same for the differentiated fields and the parameters in laws
   virtual void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                            Eigen::VectorXd& rho_bar) = 0;

@@ -89,8 +89,8 @@ void ProjectorOf<Body>::refine_adjoint(ProjectionLevel level) {
 }
 
 template <class Body>
-void ProjectorOf<Body>::set_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, bool velocities,
-                                    LaneRows& y_dir) {
+void ProjectorOf<Body>::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir,
+                                bool velocities) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     bodies_[i].tilde_tangent(y_hat_dir, frames_tilde_[i + 1], q_dirs_[i], frame_dirs_[i + 1]);
   }

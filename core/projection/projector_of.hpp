@@ -31,12 +31,7 @@ class ProjectorOf final : public Projector {
                   Eigen::VectorXd& rho_bar) override;
   bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
                  const ProjectionSolution& s) override;
-  void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
-    set_tangent(block, y_hat_dir, true, y_dir);
-  }
-  void position_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
-    set_tangent(block, y_hat_dir, false, y_dir);
-  }
+  void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir, bool velocities) override;
   void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar) override;
   void response(Eigen::VectorXd& out) override;
@@ -70,7 +65,6 @@ class ProjectorOf final : public Projector {
   void set_field_tangents(const ParameterBlock& block);  // Phi' at q along the fields into dirs_, bodies at rest
   // b_lanes_ = -(M' x + (J'lambda)')
   void set_loads(const ParameterBlock& block, const std::vector<X>& x);
-  void set_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, bool velocities, LaneRows& y_dir);
   void refine_tangent(ProjectionLevel level, const LargestEntries<Direction>& size);
   void refine_adjoint(ProjectionLevel level);
   void add_pull_back(Frames& frames, const ConstraintWeights& weights, Y& theta_bar, Y& rho_bar) {
