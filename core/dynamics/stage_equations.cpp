@@ -1,7 +1,6 @@
 #include "core/dynamics/stage_equations.hpp"
 
 #include "core/body/euler_parameters.hpp"
-#include "core/body/lanes.hpp"
 #include "core/body/state_layout.hpp"
 
 namespace mbsopt {
@@ -58,10 +57,8 @@ void StageEquations::tangent(const ParameterBlock& block, const LaneRows& y_dir,
     const Lanes<4> p_dir = y_dir.middleRows<4>(layout.p(i)), pdot_dir = y_dir.middleRows<4>(layout.pdot(i));
     const double pp = p.squaredNorm(), vv = pdot.squaredNorm();
     const Lanes<1> p_p_dir = dot(p, p_dir);
-    const Vector3d e = a.tail<3>();
     z_dir_[k - 1].setZero();
-    z_dir_[k - 1].bottomRows<3>() = (-2 / pp) * (a(0) * p_dir.bottomRows<3>() - e * p_dir.row(0) -
-                                                 cross(e, p_dir.bottomRows<3>()) + terms_.z[k - 1].tail<3>() * p_p_dir);
+    z_dir_[k - 1].bottomRows<3>() = omegadot_by_p(i) * p_dir;
     r_dir.middleRows<6>(layout.q(i)) = terms_.b_dir[k - 1] - dynamics_.solver().mass_times(i, z_dir_[k - 1]);
     r_dir.row(layout.q(i) + 6) = -dot(a, p_dir) - (2 * pp) * dot(pdot, pdot_dir) - (2 * vv) * p_p_dir;
   }
@@ -84,7 +81,7 @@ void StageEquations::add_adjoint(const Eigen::VectorXd& r_bar, Eigen::Ref<Eigen:
     const Vector3d w_bar = z_bar_[k - 1].tail<3>();
     const double r_p = r_bar(layout.q(k) + 6), pp = p.squaredNorm();
     auto p_bar = y_bar.segment<4>(layout.p(k));
-    p_bar -= (2 / pp) * (G_transposed_times(a, w_bar) + terms_.z[k - 1].tail<3>().dot(w_bar) * p);
+    p_bar += omegadot_by_p(static_cast<int>(k)).transpose() * w_bar;
     p_bar -= r_p * (a + (2 * pdot.squaredNorm()) * p);
     y_bar.segment<4>(layout.pdot(k)) -= (2 * r_p * pp) * pdot;
   }
