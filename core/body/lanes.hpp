@@ -28,4 +28,20 @@ inline Lanes<3> cross(const Vector3d& a, const Lanes<3>& b) {
   return x;
 }
 
+// G(p)'w (euler_parameters.hpp) in the directions of w, and in those of p.
+inline Lanes<4> G_transposed_times_lanes(const Vector4d& p, const Lanes<3>& w) {
+  Lanes<4> x;
+  const Vector3d e = p.tail<3>();
+  x.row(0) = -dot(e, w);
+  x.bottomRows<3>() = p(0) * w + cross(e, w);
+  return x;
+}
+inline Lanes<4> G_transposed_lanes_times(const Lanes<4>& p, const Vector3d& w) {
+  Lanes<4> x;
+  const Lanes<3> e = p.bottomRows<3>();
+  x.row(0) = -dot(w, e);
+  x.bottomRows<3>() = w * p.row(0) - cross(w, e);
+  return x;
+}
+
 }  // namespace mbsopt

@@ -61,14 +61,12 @@ void SpatialDynamics::acceleration_tangent(const ParameterBlock& block, const La
   terms_.set_tangents(block, y_dir);
   solver_.solve(terms_.b_dir, terms_.c_dir, settings_.derivatives, z_dir_, lambda_dir_);
   for (std::size_t k = 1; k < terms_.frames.size(); ++k) {
-    const Vector4d& p = terms_.frames[k].p;
     const Lanes<3> w = z_dir_[k - 1].bottomRows<3>();
     a_dir.middleRows<3>(layout.q(k)) = z_dir_[k - 1].topRows<3>();
     // pddot' = (pddot' with omegadot fixed) + 1/2 G(p)' omegadot'
     auto out = a_dir.middleRows<4>(layout.p(k));
     out = pddot_tangent(terms_.frames[k], y_dir.middleRows<4>(layout.p(k)), y_dir.middleRows<4>(layout.pdot(k)));
-    out.row(0) -= 0.5 * dot(p.tail<3>(), w);
-    out.bottomRows<3>() += 0.5 * (p(0) * w + cross(p.tail<3>(), w));
+    out += 0.5 * G_transposed_times_lanes(terms_.frames[k].p, w);
   }
 }
 

@@ -99,7 +99,7 @@ class BodyInSpace {
   // Sets q' with delta fixed, also as a virtual displacement.
   void position_tangent(const Vec<6>& delta, Direction& q_dir, Lanes<6>& x) const {
     const Lanes<4> p_tilde_dir = q_dir.bottomRows<4>();
-    const Lanes<4> pi_dir = p_tilde_dir + 0.5 * G_transposed_direction(p_tilde_dir, delta.tail<3>());
+    const Lanes<4> pi_dir = p_tilde_dir + 0.5 * G_transposed_lanes_times(p_tilde_dir, delta.tail<3>());
     const Lanes<4> p_dir = normalised(state_.p, norm_pi_, pi_dir);
     q_dir.bottomRows<4>() = p_dir;
     x.topRows<3>() = q_dir.topRows<3>();
@@ -125,7 +125,7 @@ class BodyInSpace {
                                pp;
     v_dir.bottomRows<4>() -= along * p_dir;
     v_dir.bottomRows<4>().noalias() -= p * along_dir;
-    v_dir.bottomRows<4>() += 0.5 * G_transposed_direction(p_dir, u.tail<3>());
+    v_dir.bottomRows<4>() += 0.5 * G_transposed_lanes_times(p_dir, u.tail<3>());
     set_tangent(state_, q_dir, v_dir, f_dir);
   }
   // Adds the part of u' to v'.
@@ -198,21 +198,6 @@ class BodyInSpace {
   Vector4d pi_bar(const Gradient& q_bar) const {
     const Vector4d p_bar = q_bar.tail<4>();
     return (p_bar - state_.p * state_.p.dot(p_bar)) / norm_pi_;
-  }
-  static Lanes<4> G_transposed_times_lanes(const Vector4d& p, const Lanes<3>& w) {
-    Lanes<4> out;
-    const Vector3d e = p.tail<3>();
-    out.row(0) = -dot(e, w);
-    out.bottomRows<3>() = p(0) * w + cross(e, w);
-    return out;
-  }
-  // G(p')' w for lanes of p'.
-  static Lanes<4> G_transposed_direction(const Lanes<4>& p_dir, const Vector3d& w) {
-    Lanes<4> out;
-    const Lanes<3> e_dir = p_dir.bottomRows<3>();
-    out.row(0) = -dot(w, e_dir);
-    out.bottomRows<3>() = w * p_dir.row(0) - cross(w, e_dir);
-    return out;
   }
 
   Eigen::Index q_, v_;  // rows of r and rdot in y
