@@ -95,7 +95,7 @@ void add_verdict(RunPage& page, const DesignResult& design) {
 void add_parameters(RunPage& page, const DesignResult& design) {
   const Json& parameters = page.run.result.at("parameters");
   const char* const end = end_of_search(to_string(design.status));
-  std::vector<Column> columns{
+  std::vector<TableColumn> columns{
       {"parameter"}, {"initial", "initial", 10}, {end, "value", 10}, {"unit", "unit"}, {"at bound", "at_bound"}};
   page.print(table_of(parameters, columns));
   columns.insert(columns.begin() + 4, {{"lower", "lower"}, {"upper", "upper"}});

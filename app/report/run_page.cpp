@@ -262,11 +262,11 @@ void add_multistart(RunPage& page) {
   }
   plot.logarithmic_y = all_positive(series.y);
   if (!series.y.empty()) page.plot(plot);
-  std::vector<Column> columns{{"start", "start"},
-                              {"objective", "objective", 6},
-                              {"infeasibility", "infeasibility", 2},
-                              {"optimality", "optimality", 2},
-                              {"outcome", "status"}};
+  std::vector<TableColumn> columns{{"start", "start"},
+                                   {"objective", "objective", 6},
+                                   {"infeasibility", "infeasibility", 2},
+                                   {"optimality", "optimality", 2},
+                                   {"outcome", "status"}};
   const Json parameters = result.value("parameters", Json::object());  // items() refers to it
   for (const auto& [name, p] : parameters.items()) columns.push_back({name, "parameters/" + name, 5, true});
   page.table(table_of(multistart.at("waterfall"), columns));

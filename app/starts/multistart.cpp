@@ -32,14 +32,14 @@ std::tuple<int, double, double, int> rank(const Json& record) {
 }
 
 // Prints a table of the first rows.
-void print_first(std::ostream& out, const Json& rows, const std::vector<Column>& columns) {
+void print_first(std::ostream& out, const Json& rows, const std::vector<TableColumn>& columns) {
   const Json first(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(std::min(kPrinted, rows.size())));
   out << '\n' << table_of(first, columns).text();
   if (rows.size() > kPrinted) out << fmt::format("... and {} more, in result.json\n", rows.size() - kPrinted);
 }
 
 void print_waterfall(std::ostream& out, const Json& waterfall) {
-  std::vector<Column> columns{{"rank"}};
+  std::vector<TableColumn> columns{{"rank"}};
   for (const char* key : {"start", "status", "objective", "infeasibility", "iterations", "evaluations"})
     columns.push_back({key, key});
   if (!waterfall.empty() && waterfall[0].contains("parameters"))

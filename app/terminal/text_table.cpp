@@ -51,11 +51,11 @@ std::string TextTable::text() const {
   return text;
 }
 
-TextTable table_of(const Json& rows, const std::vector<Column>& columns) {
-  std::vector<Column> shown;
+TextTable table_of(const Json& rows, const std::vector<TableColumn>& columns) {
+  std::vector<TableColumn> shown;
   std::vector<std::string> header;
-  const auto pointer = [](const Column& column) { return Json::json_pointer("/" + column.key); };
-  for (const Column& column : columns) {
+  const auto pointer = [](const TableColumn& column) { return Json::json_pointer("/" + column.key); };
+  for (const TableColumn& column : columns) {
     const auto has_it = [&](const Json& row) {
       return row.contains(pointer(column)) && !row[pointer(column)].is_null();
     };
@@ -66,7 +66,7 @@ TextTable table_of(const Json& rows, const std::vector<Column>& columns) {
   TextTable table(header);
   for (const auto& [name, entries] : rows.items()) {
     TableRow& row = table.add({});
-    for (const Column& column : shown)
+    for (const TableColumn& column : shown)
       row.push_back(column.key.empty() ? rows.is_array() ? std::to_string(table.rows().size()) : name
                                        : number_cell(entries.value(pointer(column), Json()), column.digits));
   }

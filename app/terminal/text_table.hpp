@@ -43,14 +43,14 @@ class TextTable {
 };
 
 // A column shows one entry of each row.
-struct Column {
+struct TableColumn {
   std::string header;
   std::string key = {};  // "value", "residuals/mean"; empty: the name of the row, or its number in a list
   int digits = 7;
   bool if_any = false;  // left out if no row has the entry
 };
 // rows: a list or an object of objects.
-TextTable table_of(const Json& rows, const std::vector<Column>& columns);
+TextTable table_of(const Json& rows, const std::vector<TableColumn>& columns);
 
 std::string significant(double value, int digits = 7);  // "2.146954", "1.2e-05", "-"  where it is not a number
 // A number, a word, an interval, or "-" for none.

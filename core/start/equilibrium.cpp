@@ -25,7 +25,7 @@ using Eigen::VectorXd;
 
 constexpr int kMostIterations = 5000;        // chains that slide along stiff stops take some hundreds
 constexpr double kLargestStep = 0.2;         // of a coordinate at once [lengths of the mechanism, rad]
-constexpr double kApart = 0.05;              // the places along a step at which forces are computed [the same]
+constexpr double kProbes = 0.05;             // the places along a step at which forces are computed [the same]
 constexpr double kNearPlaces = 1e-3;         // of a step: places as near to each other are one
 constexpr double kBeside = 1e-5;             // from the equilibrium, to see where the forces drive it [the same]
 constexpr double kTolerance = 1e-11;         // of the last Newton step [lengths of the mechanism, rad]
@@ -235,7 +235,7 @@ double error_along(Statics& statics, const FreeMotion& free, const OrthogonalDec
   const VectorXd from = q, change = free.stiffness * y;
   const MatrixXd direction = rates_of_poses(from, free.N * y);
   const double size = statics.size_of(free.N * y);
-  const int parts = 1 + static_cast<int>(size / kApart);
+  const int parts = 1 + static_cast<int>(size / kProbes);
   std::vector<double> places = statics.places_of_laws(from, direction);
   for (int k = 1; k <= parts; ++k) places.push_back(static_cast<double>(k) / parts);
   std::ranges::sort(places);

@@ -87,14 +87,14 @@ class BoundCost final : public RunningCost, public TerminalCost {
     VectorXd p(static_cast<Index>(parameters_.size()));
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       Program::Scratch scratch = parameters_[i].scratch();
-      p(static_cast<Index>(i)) = parameters_[i].value(span_of(rho), scratch);
+      p(static_cast<Index>(i)) = parameters_[i].value(numbers_of(rho), scratch);
     }
     return p;
   }
   void add_rho(VecIn rho, const VectorXd& p_bar, VecOut out) const {
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       Program::Scratch scratch = parameters_[i].scratch();
-      parameters_[i].add_gradient(span_of(rho), p_bar(static_cast<Index>(i)), span_of(out), scratch);
+      parameters_[i].add_gradient(numbers_of(rho), p_bar(static_cast<Index>(i)), numbers_of(out), scratch);
     }
   }
 

@@ -179,14 +179,14 @@ SecondOrder CostExpression::second_order(const Mechanism& mechanism, const State
   Program::Scratch scratch = program.scratch();
   Eigen::VectorXd e_u, e_uj, direction(u.size());
   Eigen::MatrixXd e_uu = Eigen::MatrixXd::Zero(u.size(), u.size());
-  SecondOrder result{program.value(span_of(u), scratch), Eigen::VectorXd::Zero(n), {}};
+  SecondOrder result{program.value(numbers_of(u), scratch), Eigen::VectorXd::Zero(n), {}};
   for (const int i : program.used_inputs()) {
     if (i == compiled_->time) continue;
     direction.setZero();
     direction(i) = 1;
     e_u.setZero(u.size());
     e_uj.setZero(u.size());
-    program.add_gradient_tangent(span_of(u), span_of(direction), 1, span_of(e_u), span_of(e_uj), scratch);
+    program.add_gradient_tangent(numbers_of(u), numbers_of(direction), 1, numbers_of(e_u), numbers_of(e_uj), scratch);
     e_uu.col(i) = e_uj;
     result.first += e_u(i) * U.row(i).transpose();
   }

@@ -29,7 +29,7 @@ Symbols parameter_symbols(const Scene& scene);
 Symbols time_symbols(const Scene& scene);
 
 // The numbers of a vector, as programs take them.
-auto span_of(auto& x) { return std::span(x.data(), static_cast<std::size_t>(x.size())); }
+auto numbers_of(auto& x) { return std::span(x.data(), static_cast<std::size_t>(x.size())); }
 
 // A scalar e of u = (parameters, sensors) along the tangents U = du/drho of a motion.
 struct SecondOrder {

@@ -209,7 +209,7 @@ double Objective::parameters_only(const Eigen::VectorXd& rho, const FollowedMode
   if (response_) return named(name_, [&] { return response_->value(rho, forces); });
   if (!parameters_only_) return 0;
   Program::Scratch scratch = parameters_only_->scratch();
-  return parameters_only_->value(span_of(rho), scratch);
+  return parameters_only_->value(numbers_of(rho), scratch);
 }
 
 std::vector<FrequencyResponse::Peak> Objective::parameters_only_gradients(const Eigen::VectorXd& rho,
@@ -223,7 +223,7 @@ std::vector<FrequencyResponse::Peak> Objective::parameters_only_gradients(const 
     value = named(name_, [&] { return mode_->add_gradient(rho, forces, gradient, warnings); });
   } else if (parameters_only_) {
     Program::Scratch scratch = parameters_only_->scratch();
-    value = parameters_only_->add_gradient(span_of(rho), 1, span_of(gradient), scratch);
+    value = parameters_only_->add_gradient(numbers_of(rho), 1, numbers_of(gradient), scratch);
   }
   return {{0, value, gradient(variables)}};
 }
@@ -238,8 +238,8 @@ void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const st
     gradient.setZero();
     slope.setZero();
     direction(variables[j]) = 1;
-    parameters_only_->add_gradient_tangent(span_of(rho), span_of(direction), 1, span_of(gradient), span_of(slope),
-                                           scratch);
+    parameters_only_->add_gradient_tangent(numbers_of(rho), numbers_of(direction), 1, numbers_of(gradient),
+                                           numbers_of(slope), scratch);
     for (std::size_t i = 0; i < variables.size(); ++i)
       H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += slope(variables[i]);
   }
