@@ -31,7 +31,7 @@ class DrivenMotion final : public MotionSource {
     t_ = at.t;
     y_ = at.y;
     const bool solved = dynamics_.evaluate(at.t, at.y, at.angles, ydot_);
-    const JointSolver J(d_, BodiesAt(at.y).frames, kDrivenRankThreshold);
+    const JointSolver J(d_, frames_at(at.y), kDrivenRankThreshold);
     const VectorXd z = J.solve(-dynamics_.gamma());
     motion_.lambda = solved && dynamics_.lambda().allFinite() ? dynamics_.lambda() : VectorXd::Zero(d_.m);
     std::vector<Vec<6>> left = dynamics_.loads();  // f - M z

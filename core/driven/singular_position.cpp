@@ -16,7 +16,7 @@ namespace mbsopt {
 SingularPosition singular_position(const Mechanism& mechanism, double t, const Eigen::VectorXd& y, double threshold) {
   constexpr double kShare = 1e-3;
   const MechanismData& d = mechanism.data();
-  const JointSolver J(d, BodiesAt(y).frames, threshold);
+  const JointSolver J(d, frames_at(y), threshold);
   SingularPosition s;
   s.t = t;
   s.rank_lost = static_cast<int>(6 * d.n - J.rank());

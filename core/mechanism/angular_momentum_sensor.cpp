@@ -18,8 +18,8 @@ struct AngularMomentumSensor final : SensorFunction {
     Vector3d L = Vector3d::Zero();
     for (int i = 1; i <= d.n; ++i) {
       const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
-      const BodyAt b = body_at(y, i);
-      L += body.mass * b.frame.r.cross(b.frame.rdot) + b.frame.A * (body.J * b.state.omega());
+      const Frame b = body_at(y, i);
+      L += body.mass * b.r.cross(b.rdot) + b.A * (body.J * b.omega());
     }
     return L;
   }
@@ -27,16 +27,15 @@ struct AngularMomentumSensor final : SensorFunction {
     const Vector3d L = momentum(d, at.y), z = component_gradient(L, component);
     for (int i = 1; i <= d.n && to; ++i) {
       const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
-      const BodyAt b = body_at(at.y, i);
-      const Frame& f = b.frame;
-      const Vector3d omega = b.state.omega(), z_B = f.A.transpose() * z, omega_bar = body.J * z_B;
+      const Frame f = body_at(at.y, i);
+      const Vector3d omega = f.omega(), z_B = f.A.transpose() * z, omega_bar = body.J * z_B;
       FrameBar bar = FrameBar::zero();
       bar.r = body.mass * f.rdot.cross(z);
       bar.rdot = body.mass * z.cross(f.r);
       bar.A = z * (body.J * omega).transpose();
-      bar.p = -2 * G_transposed_times(b.state.pdot, omega_bar);
-      bar.pdot = 2 * G_transposed_times(b.state.p, omega_bar);
-      to->add_frame(b, i, bar);
+      bar.p = -2 * G_transposed_times(f.pdot, omega_bar);
+      bar.pdot = 2 * G_transposed_times(f.p, omega_bar);
+      to->add_frame(f, i, bar);
       to->add_slot<1>(body.slot_mass, Vec<1>(z.dot(f.r.cross(f.rdot))));
       to->add_slot<6>(body.slot_J, inertia_gradient(z_B * omega.transpose()));
     }

@@ -38,14 +38,14 @@ inline Eigen::MatrixXd jacobian_in_motions(const MechanismData& data, const std:
 
 // Adds the gradient of  lambda'J eta + mu0'Phi + mu1'Phidot  of a primitive. The frames hold eta, which stays fixed.
 template <class P>
-void add_primitive_gradient(const P& p, const BodyPair& pair, const BodyAt& b1, const BodyAt& b2,
+void add_primitive_gradient(const P& p, const BodyPair& pair, const Frame& b1, const Frame& b2,
                             const Multipliers<P::kRows>& z, SensorGradient& to) {
   FrameBar bar1 = FrameBar::zero(), bar2 = bar1;
   GeometryBar s;
-  p.pull_back(b1.frame, b2.frame, z, bar1, bar2, s);
+  p.pull_back(b1, b2, z, bar1, bar2, s);
   if (!z.lambda.isZero(0)) {
-    fold_virtual(b1.frame.theta_eta, bar1);
-    fold_virtual(b2.frame.theta_eta, bar2);
+    fold_virtual(b1.theta_eta, bar1);
+    fold_virtual(b2.theta_eta, bar2);
   }
   to.add_frame(b1, pair.body1, bar1);
   to.add_frame(b2, pair.body2, bar2);
@@ -56,18 +56,18 @@ using ConstraintVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;  // 
 
 // The virtual work l'(J1 eta1 + J2 eta2) of the forces l = factor times `weights` on the rows of one constraint, with
 // eta = (delta r, delta theta): adds its gradient for fixed weights and eta. Returns J1 eta1 + J2 eta2.
-inline ConstraintVector add_virtual_work_gradient(const Constraint& c, BodyAt b1, BodyAt b2, const Vec<6>& eta1,
+inline ConstraintVector add_virtual_work_gradient(const Constraint& c, Frame b1, Frame b2, const Vec<6>& eta1,
                                                   const Vec<6>& eta2, const ConstraintVector& weights,
                                                   SensorGradient& to) {
-  set_virtual(eta1, b1.frame);
-  set_virtual(eta2, b2.frame);
+  set_virtual(eta1, b1);
+  set_virtual(eta2, b2);
   ConstraintVector change(c.rows());
   std::visit(
       [&]<class P>(const P& p) {
         Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
         z.lambda = c.factor * weights;
         add_primitive_gradient(p, c, b1, b2, z, to);
-        change = virtual_change(p, b1.frame, b2.frame);
+        change = virtual_change(p, b1, b2);
       },
       c.primitive);
   to.add_slot<1>(c.slot_factor, Vec<1>(weights.dot(change)));

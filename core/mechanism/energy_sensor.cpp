@@ -20,15 +20,15 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
   const StateLayout layout{d.n};
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& body = d.bodies[at(i)];
-    const BodyAt b = body_at(y, i);
-    const Vector3d &r = b.frame.r, &rdot = b.frame.rdot, w = b.state.omega(), w_bar = body.J * w;
+    const Frame b = body_at(y, i);
+    const Vector3d &r = b.r, &rdot = b.rdot, w = b.omega(), w_bar = body.J * w;
     e.kinetic += 0.5 * (body.mass * rdot.squaredNorm() + w.dot(w_bar));
     e.potential -= body.mass * d.gravity.dot(r);
     if (kinetic) {
       kinetic->y_bar.segment<3>(layout.v(i)) += kinetic->scale * body.mass * rdot;
       // w = 2 G(p) pdot = -2 G(pdot) p
-      kinetic->y_bar.segment<4>(layout.pdot(i)) += 2 * kinetic->scale * G_transposed_times(b.state.p, w_bar);
-      kinetic->y_bar.segment<4>(layout.p(i)) -= 2 * kinetic->scale * G_transposed_times(b.state.pdot, w_bar);
+      kinetic->y_bar.segment<4>(layout.pdot(i)) += 2 * kinetic->scale * G_transposed_times(b.p, w_bar);
+      kinetic->y_bar.segment<4>(layout.p(i)) -= 2 * kinetic->scale * G_transposed_times(b.pdot, w_bar);
       kinetic->add_slot<1>(body.slot_mass, Vec<1>(0.5 * rdot.squaredNorm()));
       kinetic->add_slot<6>(body.slot_J, inertia_gradient(0.5 * w * w.transpose()));
     }
@@ -40,12 +40,12 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
   }
   d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
-    const BodyAt b1 = body_at(y, i), b2 = body_at(y, j);
-    e.potential += f.potential(angles, b1.frame, b2.frame);
+    const Frame b1 = body_at(y, i), b2 = body_at(y, j);
+    e.potential += f.potential(angles, b1, b2);
     if (!potential) return;
     FrameBar bar1 = FrameBar::zero(), bar2 = bar1;
     FieldGradient fields = potential->fields();
-    f.pull_back_potential(angles, b1.frame, b2.frame, bar1, bar2, fields);
+    f.pull_back_potential(angles, b1, b2, bar1, bar2, fields);
     potential->add_frame(b1, i, bar1);
     potential->add_frame(b2, j, bar2);
   });

@@ -9,7 +9,7 @@ namespace mbsopt {
 inline void continue_angles(const MechanismData& d, const Eigen::VectorXd& y, Eigen::VectorXd& angles) {
   double* angle = angles.data();
   for (const JointAngle& a : d.angles) {
-    *angle = a.value_near(*angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
+    *angle = a.value_near(*angle, body_at(y, a.body1), body_at(y, a.body2));
     ++angle;
   }
 }

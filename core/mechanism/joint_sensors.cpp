@@ -13,14 +13,14 @@ struct JointSensor final : SensorFunction {
   bool is_rate = false;
 
   double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
-    const BodyAt b1 = body_at(at.y, joint.body1), b2 = body_at(at.y, joint.body2);
+    const Frame b1 = body_at(at.y, joint.body1), b2 = body_at(at.y, joint.body2);
     if (to) {
       Multipliers<1> z = Multipliers<1>::zero();
       (is_rate ? z.mu1 : z.mu0)(0) = 1;
       add_primitive_gradient(joint.measure, joint, b1, b2, z, *to);
     }
-    if (is_rate) return joint.rate(b1.frame, b2.frame);
-    return joint.value_near(branch(at.angles, index), b1.frame, b2.frame);
+    if (is_rate) return joint.rate(b1, b2);
+    return joint.value_near(branch(at.angles, index), b1, b2);
   }
   std::vector<int> bodies(const MechanismData&) const override { return {joint.body1, joint.body2}; }
   SensorPtr rate(const MechanismData&) const override {

@@ -37,10 +37,10 @@ double Mechanism::add_sensor_gradient(int sensor, const StatePoint& at, double s
 }
 
 Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, const StatePoint& at) {
-  const BodyAt b = body_at(at.y, body + 1);
+  const Frame b = body_at(at.y, body + 1);
   const Vector3d to_origin = -mechanism.data().bodies[static_cast<std::size_t>(body + 1)].com;
   Eigen::Matrix<double, 13, 1> row;
-  row << b.frame.point(to_origin), b.state.p, b.frame.point_dot(to_origin), b.frame.A * b.state.omega();
+  row << b.point(to_origin), b.p, b.point_dot(to_origin), b.A * b.omega();
   return row;
 }
 

@@ -8,26 +8,26 @@
 
 namespace mbsopt {
 
-BodyAt moving(const StatePoint& at, int body) {
+Frame moving(const StatePoint& at, int body) {
   assert(at.motion);
-  BodyAt b = body_at(at.y, body);
-  if (body > 0) set_acceleration(at.motion->motion(at).z[static_cast<std::size_t>(body - 1)], b.frame);
+  Frame b = body_at(at.y, body);
+  if (body > 0) set_acceleration(at.motion->motion(at).z[static_cast<std::size_t>(body - 1)], b);
   return b;
 }
 
 void add_acceleration(const StatePoint& at, const BodyPoint& point, const Vector3d& X, SensorGradient& to) {
-  const BodyAt b = moving(at, point.body);
-  to.add_slot<3>(point.slot, Vec<3>(b.frame.Addot.transpose() * X));
+  const Frame b = moving(at, point.body);
+  to.add_slot<3>(point.slot, Vec<3>(b.Addot.transpose() * X));
   if (point.body == 0) return;
   FrameBar bar = FrameBar::zero();
   bar.Addot = to.scale * X * point.s.transpose();
   const StateLayout layout{to.data.n};
-  add_pull_back(b.state, bar, Vector4d::Zero(), Vector3d::Zero(), to.y_bar.segment<7>(layout.q(point.body)),
+  add_pull_back(b, bar, Vector4d::Zero(), Vector3d::Zero(), to.y_bar.segment<7>(layout.q(point.body)),
                 to.y_bar.segment<7>(layout.v(point.body)));
   // X'A (omegadot x s) = omegadot'(s x A'X)
   Vec<6>& out = at.motion->bar().z[static_cast<std::size_t>(point.body - 1)];
   out.head<3>() += to.scale * X;
-  out.tail<3>() += to.scale * point.s.cross(b.frame.A.transpose() * X);
+  out.tail<3>() += to.scale * point.s.cross(b.A.transpose() * X);
 }
 
 BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where) {
@@ -37,7 +37,7 @@ BodyPoint sensor_point(Compilation& model, const std::string& body, const PointF
   return result;
 }
 
-void add_point(const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar, const Vector3d& V_bar,
+void add_point(const Frame& body, const BodyPoint& point, const Vector3d& X_bar, const Vector3d& V_bar,
                SensorGradient& to) {
   FrameBar bar = FrameBar::zero();
   bar.r = X_bar;
@@ -45,7 +45,7 @@ void add_point(const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar
   bar.A = X_bar * point.s.transpose();
   bar.Adot = V_bar * point.s.transpose();
   to.add_frame(body, point.body, bar);
-  to.add_slot<3>(point.slot, Vec<3>(body.frame.A.transpose() * X_bar + body.frame.Adot.transpose() * V_bar));
+  to.add_slot<3>(point.slot, Vec<3>(body.A.transpose() * X_bar + body.Adot.transpose() * V_bar));
 }
 
 namespace {
@@ -100,10 +100,10 @@ double PointSensor::evaluate(const MechanismData&, const StatePoint& at, SensorG
   }
   const bool moves = quantity == Quantity::acceleration, is_rate = quantity == Quantity::position_rate;
   const auto placed = [&](int body) { return moves ? moving(at, body) : body_at(y, body); };
-  const BodyAt A = placed(a.body), B = relative ? placed(b.body) : BodyAt(), axes = body_at(y, axes_body);
-  const Matrix3d &R = axes.frame.A, &Rdot = axes.frame.Adot;
-  Vector3d X[] = {A.frame.point(a.s), A.frame.point_dot(a.s), A.frame.point_ddot(a.s)};
-  if (relative) X[0] -= B.frame.point(b.s), X[1] -= B.frame.point_dot(b.s), X[2] -= B.frame.point_ddot(b.s);
+  const Frame A = placed(a.body), B = relative ? placed(b.body) : Frame(), axes = body_at(y, axes_body);
+  const Matrix3d &R = axes.A, &Rdot = axes.Adot;
+  Vector3d X[] = {A.point(a.s), A.point_dot(a.s), A.point_ddot(a.s)};
+  if (relative) X[0] -= B.point(b.s), X[1] -= B.point_dot(b.s), X[2] -= B.point_ddot(b.s);
   const int order = is_rate ? 0 : static_cast<int>(quantity);
   const Vector3d L = R.transpose() * X[order], direction = component_gradient(L, component);
   double result = component_value(L, component);
@@ -124,7 +124,7 @@ double PointSensor::evaluate(const MechanismData&, const StatePoint& at, SensorG
   }
   if (!to) return result;
   to->add_frame(axes, axes_body, R_bar);
-  const auto add = [&](const BodyAt& body, const BodyPoint& point, double sign) {
+  const auto add = [&](const Frame& body, const BodyPoint& point, double sign) {
     if (moves) return add_acceleration(at, point, sign * X_bar[2], *to);
     add_point(body, point, sign * X_bar[0], sign * X_bar[1], *to);
   };

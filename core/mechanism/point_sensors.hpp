@@ -23,11 +23,11 @@ struct BodyPoint {
 BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where);
 
 // Adds the gradients X_bar in the position of a body point and V_bar in its velocity.
-void add_point(const BodyAt& body, const BodyPoint& point, const Vector3d& X_bar, const Vector3d& V_bar,
+void add_point(const Frame& body, const BodyPoint& point, const Vector3d& X_bar, const Vector3d& V_bar,
                SensorGradient& to);
 
 // A body with the acceleration from the equations of motion.
-BodyAt moving(const StatePoint& at, int body);
+Frame moving(const StatePoint& at, int body);
 
 // Adds the gradient of X' times the acceleration of the point. The part in the motion goes to at.motion->bar().
 void add_acceleration(const StatePoint& at, const BodyPoint& point, const Vector3d& X, SensorGradient& to);

@@ -22,11 +22,11 @@ Loads loads_on_body2(const MechanismData& d, const ReactionSensor& s, const Eige
   Loads loads;
   for (const Constraint& c : d.constraints) {
     if (c.joint != s.joint) continue;
-    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    const Frame b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
     std::visit(
         [&]<class P>(const P& p) {
           Mat<P::kRows, 6> J1, J2;
-          p.jacobian(b1.frame, b2.frame, J1, J2);
+          p.jacobian(b1, b2, J1, J2);
           const Vec<6> f = J2.transpose() * weights<P>(c, lambda);
           loads.F -= f.template head<3>();
           loads.T -= f.template tail<3>();
@@ -68,8 +68,8 @@ double ReactionSensor::evaluate(const MechanismData& d, const Eigen::VectorXd& y
     if (to) (*lambda_bar)(drive_row) -= to->scale;
     return -lambda(drive_row);
   }
-  const BodyAt b2 = body_at(y, body2);
-  const Matrix3d& A2 = b2.frame.A;
+  const Frame b2 = body_at(y, body2);
+  const Matrix3d& A2 = b2.A;
   const Loads loads = loads_on_body2(d, *this, y, lambda);
   const Vector3d x = measured(*this, loads, A2);
   const double result = component_value(x, component);

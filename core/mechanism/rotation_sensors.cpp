@@ -24,8 +24,8 @@ struct AngularVelocitySensor final : SensorFunction {
   MountAxis axis;
 
   double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
-    const BodyAt b = body_at(at.y, body);
-    const Vector4d &p = b.state.p, &pdot = b.state.pdot;
+    const Frame b = body_at(at.y, body);
+    const Vector4d &p = b.p, &pdot = b.pdot;
     const Vector3d e = p.tail<3>(), f = pdot.tail<3>();
     const double sign = in_body_frame ? -1 : 1;  // of e x edot
     const Vector3d w = 2 * (p(0) * f - pdot(0) * e + sign * e.cross(f));
@@ -50,13 +50,13 @@ struct SpecificForceSensor final : SensorFunction {
   MountAxis axis;
 
   double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
-    const BodyAt b = moving(at, point.body);
-    const Vector3d W = b.frame.point_ddot(point.s) - d.gravity, along = b.frame.A * axis.m;
+    const Frame b = moving(at, point.body);
+    const Vector3d W = b.point_ddot(point.s) - d.gravity, along = b.A * axis.m;
     if (!to) return along.dot(W);
     FrameBar bar = FrameBar::zero();
     bar.A = W * axis.m.transpose();
     to->add_frame(b, point.body, bar);
-    to->add_slot<3>(axis.slot, Vec<3>(b.frame.A.transpose() * W));
+    to->add_slot<3>(axis.slot, Vec<3>(b.A.transpose() * W));
     to->add_slot<3>(d.slot_gravity, Vec<3>(-along));
     add_acceleration(at, point, along, *to);
     at.motion->fold_bar(at, to->y_bar, to->rho_bar);

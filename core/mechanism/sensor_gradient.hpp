@@ -13,7 +13,7 @@ struct SensorGradient {
   VecOut y_bar, rho_bar;
 
   // Adds scale times a gradient in the frame of a body, and in a field.
-  void add_frame(const BodyAt& b, int body, const FrameBar& bar) { add_pull_back(b, body, bar, scale, y_bar); }
+  void add_frame(const Frame& b, int body, const FrameBar& bar) { add_pull_back(b, body, bar, scale, y_bar); }
   template <int N>
   void add_slot(int slot, const Vec<N>& bar) {
     fields().add<N>(slot, bar);

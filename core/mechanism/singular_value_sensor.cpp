@@ -9,7 +9,6 @@
 // occurs twice has no derivative; the gradient is then that of one of the two. Source of dsigma: G. H. Golub, C. F. Van
 // Loan, "Matrix Computations", section 8.6.
 #include <cmath>
-#include <optional>
 
 #include "core/body/state_layout.hpp"
 #include "core/linear/dense.hpp"
@@ -20,7 +19,7 @@ namespace mbsopt {
 namespace {
 
 struct Scaled {
-  std::optional<BodiesAt> bodies;
+  std::vector<Frame> frames;
   Eigen::MatrixXd J;            // rows of length 1
   Eigen::VectorXd norms;        // |j_i|
   double length = 1;            // L [m]
@@ -44,8 +43,8 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
   for_each_point(d, [&](const Vector3d& s, int) { sum += s.squaredNorm(), ++out.points; });
   if (sum > 0) out.length = std::sqrt(sum / out.points);
 
-  out.bodies.emplace(y);
-  out.J = jacobian_in_motions(d, out.bodies->frames);
+  out.frames = frames_at(y);
+  out.J = jacobian_in_motions(d, out.frames);
   for (Eigen::Index k = 3; k < out.J.cols(); k += 6) out.J.middleCols<3>(k) /= out.length;
   out.norms = out.J.rowwise().norm();
   for (Eigen::Index i = 0; i < out.J.rows(); ++i)
@@ -78,7 +77,7 @@ struct SingularValueFunction final : SensorFunction {
         const auto part = [&](int body) {
           return body > 0 ? Vec<6>(W.block<1, 6>(c.row + i, layout.z(body)).transpose()) : Vec<6>(Vec<6>::Zero());
         };
-        add_virtual_work_gradient(c, x.bodies->body(c.body1), x.bodies->body(c.body2), part(c.body1), part(c.body2),
+        add_virtual_work_gradient(c, x.frames[at(c.body1)], x.frames[at(c.body2)], part(c.body1), part(c.body2),
                                   ConstraintVector::Unit(c.rows(), i), *to);
       }
     for_each_point(

@@ -34,8 +34,8 @@ struct TensionFunction final : SensorFunction {
     d.forces->visit_law(place, [&](const auto& f) {
       Law::Scratch& scratch = scratch_of_this_thread(d, f.law);
       const auto [i, j] = f.bodies();
-      const BodyAt b1 = body_at(at.y, i), b2 = body_at(at.y, j);
-      const auto [x, xdot] = f.measured(at.angles, b1.frame, b2.frame);
+      const Frame b1 = body_at(at.y, i), b2 = body_at(at.y, j);
+      const auto [x, xdot] = f.measured(at.angles, b1, b2);
       if (!to) {
         value = f.law.value(at.t, d.rho, x, xdot, scratch);
         return;
@@ -44,7 +44,7 @@ struct TensionFunction final : SensorFunction {
       add_law_gradient(f.law, x, xdot, scratch, *to);
       FrameBar bar1 = FrameBar::zero(), bar2 = bar1;
       FieldGradient fields = to->fields();
-      f.pull_back_measured(b1.frame, b2.frame, law.f_x, law.f_xdot, bar1, bar2, fields);
+      f.pull_back_measured(b1, b2, law.f_x, law.f_xdot, bar1, bar2, fields);
       to->add_frame(b1, i, bar1);
       to->add_frame(b2, j, bar2);
       value = law.f;

@@ -24,8 +24,8 @@ struct TransmissionFunction final : SensorFunction {
   Link link1, link2;
 
   double evaluate(const MechanismData&, const StatePoint& at, SensorGradient* to) const override {
-    const BodyAt b1 = body_at(at.y, link1.body), b2 = body_at(at.y, link2.body);
-    const Vector3d x1 = b1.frame.A * link1.s, x2 = b2.frame.A * link2.s;
+    const Frame b1 = body_at(at.y, link1.body), b2 = body_at(at.y, link2.body);
+    const Vector3d x1 = b1.A * link1.s, x2 = b2.A * link2.s;
     const double across = x1.cross(x2).norm(), along = x1.dot(x2);
     // across = |x1| |x2| sin(mu): the formula never divides by a length of zero.
     if (to && across > 0) {
@@ -37,11 +37,11 @@ struct TransmissionFunction final : SensorFunction {
   std::vector<int> bodies(const MechanismData&) const override { return {link1.body, link2.body}; }
 
  private:
-  static void add(const Link& link, const BodyAt& body, const Vector3d& x_bar, SensorGradient& to) {
+  static void add(const Link& link, const Frame& body, const Vector3d& x_bar, SensorGradient& to) {
     FrameBar bar = FrameBar::zero();
     bar.A = x_bar * link.s.transpose();
     to.add_frame(body, link.body, bar);
-    to.add_slot<3>(link.slot, Vec<3>(body.frame.A.transpose() * x_bar));
+    to.add_slot<3>(link.slot, Vec<3>(body.A.transpose() * x_bar));
   }
 };
 

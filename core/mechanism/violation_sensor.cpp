@@ -30,11 +30,11 @@ Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorX
   double sum = 0;
   for (std::size_t i = 0; i < d.constraints.size(); ++i) {
     const Constraint& c = d.constraints[i];
-    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    const Frame b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
     const bool last_term = i + 1 == d.constraints.size() || d.constraints[i + 1].row != c.row;
     std::visit(
         [&](const auto& p) {
-          const auto phi = phi_of(c, p, b1.frame, b2.frame, laws, angles);
+          const auto phi = phi_of(c, p, b1, b2, laws, angles);
           sum += c.factor * phi(0);
           if (!last_term) return;
           offer(sum - laws.f_or_zero(c.row), c.row, 0);
@@ -71,13 +71,13 @@ struct ViolationFunction final : SensorFunction {
     laws.add_gradient(0, worst.row, -to.scale, to.rho_bar);
     for (const Constraint& c : d.constraints) {
       if (worst.row < c.row || worst.row >= c.row + c.rows()) continue;
-      const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+      const Frame b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
       std::visit(
           [&]<class P>(const P& p) {
             Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
             z.mu0(worst.row - c.row) = c.factor;
             add_primitive_gradient(p, c, b1, b2, z, to);
-            const double value = phi_of(c, p, b1.frame, b2.frame, laws, angles)(worst.row - c.row);
+            const double value = phi_of(c, p, b1, b2, laws, angles)(worst.row - c.row);
             to.add_slot<1>(c.slot_factor, Vec<1>(value));
           },
           c.primitive);

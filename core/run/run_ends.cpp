@@ -21,7 +21,7 @@ SimulationResult result_at_start(const Assembly& start, double t, std::size_t co
 double fastest_followed_rate(const MechanismData& data, const Eigen::VectorXd& y) {
   double fastest = 0;
   for (const JointAngle& a : data.angles)
-    fastest = std::max(fastest, std::abs(a.rate(body_at(y, a.body1).frame, body_at(y, a.body2).frame)));
+    fastest = std::max(fastest, std::abs(a.rate(body_at(y, a.body1), body_at(y, a.body2))));
   return fastest;
 }
 

@@ -65,7 +65,7 @@ VectorXd AssemblyEquations::branches(const AssemblyTarget& target) const {
 
 void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) const {
   if (std::ranges::none_of(data_.groups, &RowGroup::shared)) return;
-  const BodiesAt bodies(y);
+  const std::vector<Frame> frames = frames_at(y);
   VectorXd phi(data_.m);
   for (const RowGroup& g : data_.groups) {
     if (!g.shared) continue;
@@ -74,7 +74,7 @@ void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) 
     for (; c != data_.constraints.end() && c->row == g.row; ++c)
       if (std::holds_alternative<Angle>(c->primitive)) last = &*c;
     if (!last || last->factor == 0) continue;
-    ConstraintTerms(data_).phi(bodies.frames, laws_, angles, phi);
+    ConstraintTerms(data_).phi(frames, laws_, angles, phi);
     double& angle = angles(last->angle);
     angle = Angle::on_branch(angle, angle - phi(g.row) / last->factor);
   }
@@ -85,7 +85,7 @@ void AssemblyEquations::start_branches(const VectorXd& y) {
   for (std::size_t i = 0; i < data_.angles.size(); ++i) {
     const JointAngle& a = data_.angles[i];
     double& angle = angles_(static_cast<Index>(i));
-    angle = a.value(body_at(y, a.body1).frame, body_at(y, a.body2).frame);
+    angle = a.value(body_at(y, a.body1), body_at(y, a.body2));
     if (angle < kHalfTurn) angle += 2 * std::numbers::pi;
   }
   settle_shared_rows(y, angles_);
@@ -162,16 +162,16 @@ void AssemblyEquations::accept(const VectorXd& x) {
 }
 
 VectorXd AssemblyEquations::values_at(const VectorXd& y) const {
-  const BodiesAt bodies(y);
+  const std::vector<Frame> frames = frames_at(y);
   VectorXd of_joints(data_.m), F(rows());
   if (positions())
-    ConstraintTerms(data_).phi(bodies.frames, laws_, angles_, of_joints);
+    ConstraintTerms(data_).phi(frames, laws_, angles_, of_joints);
   else
-    ConstraintTerms(data_).phi_dot(bodies.frames, laws_, of_joints);
+    ConstraintTerms(data_).phi_dot(frames, laws_, of_joints);
   F.head(data_.m) = of_joints;
   Index row = data_.m;
-  for (std::size_t i = 1; i < bodies.states.size(); ++i) {
-    const BodyState& b = bodies.states[i];
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    const Frame& b = frames[i];
     F(row++) = positions() ? UnitNorm::phi(b.p) : UnitNorm::phi_dot(b.p, b.pdot);
   }
   for (const AssemblyTarget& target : targets_)
@@ -182,14 +182,14 @@ VectorXd AssemblyEquations::values_at(const VectorXd& y) const {
 // Calls add(row, column, value) for the gradient in y of the joints' rows at a level, and add_field(row, slot, bar) for
 // that in fields. If `only` is a body, other bodies' joints are left out.
 template <class AddEntry, class AddField>
-void AssemblyEquations::for_joint_gradients(AssemblyLevel level, const BodiesAt& bodies, int only, AddEntry&& add,
-                                            AddField&& add_field) const {
+void AssemblyEquations::for_joint_gradients(AssemblyLevel level, const std::vector<Frame>& frames, int only,
+                                            AddEntry&& add, AddField&& add_field) const {
   const bool positions = level == AssemblyLevel::position;
   const StateLayout layout{data_.n};
   const auto add_body = [&](Index row, int body, const FrameBar& bar) {
     if (body == 0) return;
     Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
-    add_pull_back_velocity(bodies.states[at(body)], bar, 1, q_bar, v_bar);
+    add_pull_back_velocity(frames[at(body)], bar, 1, q_bar, v_bar);
     for (Index k = 0; k < 7; ++k) {
       add(row, layout.q(body) + k, q_bar(k));
       add(row, layout.v(body) + k, v_bar(k));
@@ -197,7 +197,7 @@ void AssemblyEquations::for_joint_gradients(AssemblyLevel level, const BodiesAt&
   };
   for (const Constraint& c : data_.constraints) {
     if (only > 0 && c.body1 != only && c.body2 != only) continue;
-    const Frame &f1 = bodies.frames[at(c.body1)], &f2 = bodies.frames[at(c.body2)];
+    const Frame &f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
     std::visit(
         [&]<class P>(const P& p) {
           for (int i = 0; i < P::kRows; ++i) {
@@ -232,7 +232,7 @@ std::vector<SparseEntry> AssemblyEquations::entries(const VectorXd& y, MatrixXd*
   const auto add_field = [&](Index row, int slot, const auto& bar) {
     if (rho) FieldGradient{data_.theta_rho, data_.active, 1, rho_bars.col(row)}.add(slot, bar);
   };
-  for_joint_gradients(level_, BodiesAt(y), 0, add, add_field);
+  for_joint_gradients(level_, frames_at(y), 0, add, add_field);
   for (const RowLaw& law : data_.laws)
     if (rho) laws_.add_gradient(positions() ? 0 : 1, law.row, -1, rho_bars.col(law.row));
   Index row = data_.m;
@@ -270,14 +270,13 @@ AssemblyEquations::Gradients AssemblyEquations::second(const VectorXd& y, const 
   MatrixXd rho_bars = MatrixXd::Zero(data_.rho.size(), N);
   VectorXd at_rest = y;
   at_rest.tail(N).setZero();
-  BodiesAt bodies(at_rest);
+  std::vector<Frame> frames = frames_at(at_rest);
   for (int i = 1; i <= data_.n; ++i) {
-    Frame& frame = bodies.frames[at(i)];
+    Frame& frame = frames[at(i)];
     for (Index j = layout.q(i); j < layout.q(i) + 7; ++j) {
       set_velocity(Vec<7>::Unit(j - layout.q(i)), frame);
-      bodies.states[at(i)] = frame;
       for_joint_gradients(
-          AssemblyLevel::velocity, bodies, i,
+          AssemblyLevel::velocity, frames, i,
           [&](Index row, Index column, double value) {
             if (column < N) out.y(j, column) += nu(row) * value;
           },

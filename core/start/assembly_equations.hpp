@@ -78,7 +78,7 @@ class AssemblyEquations final : public NearestPointEquations {
 
  private:
   template <class AddEntry, class AddField>
-  void for_joint_gradients(AssemblyLevel level, const BodiesAt& bodies, int only, AddEntry&& add,
+  void for_joint_gradients(AssemblyLevel level, const std::vector<Frame>& frames, int only, AddEntry&& add,
                            AddField&& add_field) const;
   bool positions() const { return level_ == AssemblyLevel::position; }
   Eigen::Index first(const Eigen::VectorXd& x) const { return positions() ? 0 : x.size(); }  // of the unknowns, in y

@@ -34,8 +34,7 @@ constexpr double kNotZero = 0.1;  // of the rise over half a window: a least reg
 constexpr double kAlmostHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
 
 Vector3d rotation_vector(const Bushing& b, const Eigen::VectorXd& y) {
-  const Eigen::AngleAxisd turn(
-      Matrix3d(body_at(y, b.body1).frame.A.transpose() * body_at(y, b.body2).frame.A * b.R0.transpose()));
+  const Eigen::AngleAxisd turn(Matrix3d(body_at(y, b.body1).A.transpose() * body_at(y, b.body2).A * b.R0.transpose()));
   return turn.angle() * turn.axis();
 }
 

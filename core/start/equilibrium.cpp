@@ -66,12 +66,12 @@ class Statics {
   MatrixXd z_of_parameters() { return acceleration_of_parameters(dynamics_, Accelerations::z); }
 
   // A basis of the motions xi that joints and drives leave free: J xi = 0.
-  MatrixXd free_motions() const { return null_space(unit_rows(d_, BodiesAt(y_).frames).J, UnitRows::kRankThreshold); }
+  MatrixXd free_motions() const { return null_space(unit_rows(d_, frames_at(y_)).J, UnitRows::kRankThreshold); }
   // xi_p': the motion with the parameters that the joints ask for. J xi_p' = -Phi_rho
   MatrixXd motion_of_parameters() const {
     AssemblyEquations equations(d_, AssemblyLevel::position, t_);
     equations.start_branches(y_);
-    return JointSolver(d_, BodiesAt(y_).frames).solve(-equations.gradients(y_).rho.topRows(d_.m));
+    return JointSolver(d_, frames_at(y_)).solve(-equations.gradients(y_).rho.topRows(d_.m));
   }
 
   MatrixXd mass_times(const MatrixXd& x) const {
@@ -121,7 +121,7 @@ class Statics {
         if (f.law.program)
           add(*f.law.program, [&](const VectorXd& y, std::vector<double>& of_law) {
             const auto [i, j] = f.bodies();
-            const auto [x, xdot] = f.measured(angles_, body_at(y, i).frame, body_at(y, j).frame);
+            const auto [x, xdot] = f.measured(angles_, body_at(y, i), body_at(y, j));
             of_law.insert(of_law.end(), {x, 0.0, t_});
           });
       }
@@ -182,7 +182,7 @@ class Statics {
       if (p && c.body2 > 0) length = std::max(length, p->s2.norm());
     }
     for (const TsdaForce& f : d_.forces->of<TsdaForce>()) {
-      length = std::max(length, f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l);
+      length = std::max(length, f.span(body_at(y, f.body1), body_at(y, f.body2)).l);
     }
     for (int i = 2; i <= d_.n; ++i) length = std::max(length, (y.segment<3>(layout_.q(i)) - y.head<3>()).norm());
     return length > 0 ? length : 1;

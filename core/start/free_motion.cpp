@@ -46,11 +46,7 @@ struct JointPoint {
 class MotionNames {
  public:
   MotionNames(const MechanismData& data, const VectorXd& y)
-      : d_(data),
-        layout_{data.n},
-        frames_(BodiesAt(y).frames),
-        points_(frames_.size()),
-        J_(unit_rows(data, frames_).J) {
+      : d_(data), layout_{data.n}, frames_(frames_at(y)), points_(frames_.size()), J_(unit_rows(data, frames_).J) {
     for (const Constraint& c : d_.constraints) add_points(c);
   }
 

@@ -35,7 +35,7 @@ constexpr double kMuchViolated = 0.1;  // of the mechanism's size for points, ra
 void add_jacobian(const MechanismData& d, const VectorXd& y, std::vector<SparseEntry>& rows) {
   const StateLayout layout{d.n};
   ConstraintRows J(d);
-  J.evaluate(BodiesAt(y).frames);
+  J.evaluate(frames_at(y));
   for (const RowGroup& g : d.groups) {
     for (int r = 0; r < g.rows; ++r) {
       for (int k = 0; k < 6; ++k) {
@@ -85,7 +85,7 @@ void add_massless(const MechanismData& d, const VectorXd& y, std::vector<std::st
 void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
   const double zero = kZeroLength * joint_lengths(d).whole;
   for (const TsdaForce& f : d.forces->of<TsdaForce>()) {
-    const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
+    const double l = f.span(body_at(y, f.body1), body_at(y, f.body2)).l;
     if (l > zero) continue;
     warnings.push_back(fmt::format(
         "a tsda between '{}' and '{}' has zero length at the start, where it has no direction; its force acts "
@@ -270,7 +270,7 @@ void add_violations(const MechanismData& d, std::vector<std::string>& warnings) 
   }
   VectorXd guess = VectorXd::Zero(StateLayout{d.n}.size());
   guess.head(guess.size() / 2) = position_guess(d);
-  const std::vector<Frame> frames = BodiesAt(guess).frames;
+  const std::vector<Frame> frames = frames_at(guess);
   std::map<int, double> worst_point, worst_axis;
   for (const Constraint& c : d.constraints) {
     if (c.joint < 0) continue;

@@ -94,7 +94,7 @@ void JumpWatch::set_inputs(const Function& f, const StatePoint& at) {
   if (f.of == Inputs::law) {
     d.forces->visit_law(f.place, [&](const auto& force) {
       const auto [i, j] = force.bodies();
-      const auto [x, xdot] = force.measured(at.angles, body_at(at.y, i).frame, body_at(at.y, j).frame);
+      const auto [x, xdot] = force.measured(at.angles, body_at(at.y, i), body_at(at.y, j));
       inputs_[P] = x;
       inputs_[P + 1] = xdot;
       inputs_[P + 2] = at.t;
@@ -195,9 +195,7 @@ std::string JumpWatch::look_at(const SeenStep& step) {
 void JumpWatch::look_at_directions() {
   constexpr double kTurned = 0.5;  // the cosine
   for (const TsdaForce& f : mechanism_.data().forces->of<TsdaForce>()) {
-    const auto direction = [&](const Eigen::VectorXd& y) {
-      return f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).u;
-    };
+    const auto direction = [&](const Eigen::VectorXd& y) { return f.span(body_at(y, f.body1), body_at(y, f.body2)).u; };
     const auto is_known = [&](const Jump& j) {
       return j.size == 0 && j.of == Jump::Owner::force && j.index == f.force;
     };

@@ -21,8 +21,8 @@ constexpr double kNoticeableChange = 1e-3;                  // of the natural en
 constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
 constexpr double kGrowth = 1e3;                             // of the largest speed at the start
 
-// The natural size of the energy of a motion: of weights at their height, or at the radius of gyration of a body, and of
-// springs. It is a scale for runs that begin at rest at zero potential.
+// The natural size of the energy of a motion: of weights at their height, or at the radius of gyration of a body, and
+// of springs. It is a scale for runs that begin at rest at zero potential.
 double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
   const StateLayout layout{d.n};
   double sum = 0;
@@ -32,7 +32,7 @@ double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
   }
   d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
-    sum += f.natural_energy(body_at(y, i).frame, body_at(y, j).frame);
+    sum += f.natural_energy(body_at(y, i), body_at(y, j));
   });
   return sum;
 }

@@ -46,9 +46,7 @@ double closest(const Vector3d& d0, const Vector3d& rate0, const Vector3d& d1, co
 std::string through_zero_length(const MechanismData& d, double t0, const Eigen::VectorXd& y0, double t1,
                                 const Eigen::VectorXd& y1) {
   for (const TsdaForce& f : d.forces->of<TsdaForce>()) {
-    const auto span = [&](const Eigen::VectorXd& y) {
-      return f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame);
-    };
+    const auto span = [&](const Eigen::VectorXd& y) { return f.span(body_at(y, f.body1), body_at(y, f.body2)); };
     const SpringSpan<Vector3d> a = span(y0), b = span(y1);
     if (a.u.dot(b.u) >= 0) continue;
     const double pull = pull_at_zero(f, t1, d.rho);
