@@ -94,6 +94,7 @@ struct IdentificationResult {
 
 // Options of an identification that the problem does not give.
 struct IdentificationOptions {
+  std::vector<std::shared_ptr<const UserForce>> user_forces;  // beside those of the scene; they see all parameters
   std::function<bool(const FitRow&)> progress;        // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
   // No step is taken: residuals at the start, and the standard errors that the given sigmas predict there.

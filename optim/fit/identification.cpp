@@ -253,6 +253,17 @@ class Identification {
   std::mutex progress_lock_;
 };
 
+// Moves the forces of the options into the scene.
+void take_user_forces(Problem& problem, IdentificationOptions& options) {
+  for (const std::shared_ptr<const UserForce>& term : std::exchange(options.user_forces, {})) {
+    UserForceSpec force;
+    force.force = "C++";
+    force.term = term;
+    for (const Parameter& p : problem.scene.parameters) force.parameters.push_back({p.name, Expression::parse(p.name)});
+    problem.scene.forces.push_back({fmt::format("user force {}", problem.scene.forces.size()), std::move(force)});
+  }
+}
+
 Fit fit_of(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options) {
   const CutProblem cut = cut_into_windows(what_measurements_need(problem), data, options.simulation_progress);
   Fit fit = Identification(cut.problem, cut.data, options).run();
@@ -313,10 +324,13 @@ bool moved(const ExperimentStack& stack, Eigen::VectorXd u, Index k, double h, E
 }  // namespace
 
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
-                                        const IdentificationOptions& options) {
-  Fit fit = fit_of(problem, data, options);
+                                        const IdentificationOptions& given) {
+  IdentificationOptions options = given;
+  Problem whole = problem;
+  take_user_forces(whole, options);
+  Fit fit = fit_of(whole, data, options);
   if (!fit.angles.empty())
-    std::ranges::move(confirmed(fit.angles, problem, data, options), std::back_inserter(fit.result.warnings));
+    std::ranges::move(confirmed(fit.angles, whole, data, options), std::back_inserter(fit.result.warnings));
   return std::move(fit.result);
 }
 
@@ -330,7 +344,10 @@ Problem with_fitted_values(Problem problem, const IdentificationResult& fit) {
   return problem;
 }
 
-FitStart start_of_fit(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options) {
+FitStart start_of_fit(const Problem& cut, const std::vector<CsvTable>& data, const IdentificationOptions& given) {
+  IdentificationOptions options = given;
+  Problem problem = cut;
+  take_user_forces(problem, options);
   const IdentificationSpec& spec = *problem.identification;
   std::atomic<bool> abandoned = false;
   Experiment::Limits limits;

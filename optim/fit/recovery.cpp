@@ -99,6 +99,7 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
     Problem again = problem;
     keep_fitted(again, simulated);
     IdentificationOptions identification;
+    identification.user_forces = options.user_forces;
     identification.simulation_progress = [&](double t) {
       const std::scoped_lock lock(progress_lock);
       if (options.simulation_progress && !options.simulation_progress(t)) stopped = true;

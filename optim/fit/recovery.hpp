@@ -37,6 +37,7 @@ struct Recovery {
 struct RecoveryOptions {
   int seeds = 0;    // 1, 2, ..., seeds
   int threads = 1;  // fits at a time; results do not depend on it
+  std::vector<std::shared_ptr<const UserForce>> user_forces = {};
   // Called from any thread, one at a time: after each fit, false stops; within a simulation, false abandons all.
   std::function<bool(int done)> progress = {};
   std::function<bool(double t)> simulation_progress = {};
