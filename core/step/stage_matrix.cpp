@@ -183,21 +183,11 @@ void StageMatrix::add_joint(const Joint& joint, int i, const MotionJacobian::Val
   }
 }
 
-// f(row, column, block) for the blocks of N that a stage shares with no other, but for -c: M Z, J Z and J'.
-template <class Function>
-void StageMatrix::for_each_own_block(const MotionJacobian::Values& of, Function&& f) const {
-  for (int b = 0; b < jacobian_->bodies(); ++b) f(columns_of(b), columns_of(b), of.mass[at(b)]);
-  for (std::size_t k = 0; k < of.J.size(); ++k) {
-    const auto& [row, body] = jacobian_->rows()[k];
-    f(accelerations_ + row, columns_of(body), of.J_Z[k]);
-    f(columns_of(body), accelerations_ + row, Vec<6>(of.J[k].transpose()));
-  }
-}
-
 // f(row, column, value) for all entries of N with epsilon, scaled, always in the same order.
 template <class Function>
 void StageMatrix::for_each_entry(Function&& f) const {
   for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& of = *values_[at(i)];
     const auto add = [&](int stage, Eigen::Index row, Eigen::Index column, const auto& block) {
       for (Eigen::Index c = 0; c < block.cols(); ++c) {
         for (Eigen::Index r = 0; r < block.rows(); ++r) {
@@ -208,11 +198,16 @@ void StageMatrix::for_each_entry(Function&& f) const {
     };
     for (int j = 0; j < stages_; ++j) {
       const double p = P_(i, j), pp = P2_(i, j);
-      jacobian_->for_each_block(*values_[at(i)], [&]<class Block>(int row, int column, const Block& q, const Block& v) {
+      jacobian_->for_each_block(of, [&]<class Block>(int row, int column, const Block& q, const Block& v) {
         add(j, row, column, Block(p * v + pp * q));
       });
     }
-    for_each_own_block(*values_[at(i)], [&](auto row, auto column, const auto& block) { add(i, row, column, block); });
+    for (int b = 0; b < jacobian_->bodies(); ++b) add(i, columns_of(b), columns_of(b), of.mass[at(b)]);
+    for (std::size_t k = 0; k < of.J.size(); ++k) {
+      const auto& [row, body] = jacobian_->rows()[k];
+      add(i, accelerations_ + row, columns_of(body), of.J_Z[k]);
+      add(i, columns_of(body), accelerations_ + row, of.J[k].transpose());
+    }
     for (int r = 0; r < jacobian_->constraints(); ++r) {
       add(i, accelerations_ + r, accelerations_ + r, Mat<1, 1>(-1 / W_(r)));
     }
@@ -261,7 +256,7 @@ bool StageMatrix::is_accurate() {
   }
   if (!answer_.allFinite()) return false;
   probe_.setZero();
-  add_J_transposed(answer_, probe_);
+  add_J_transposed(1, answer_, probe_);
   for (int i = 0; i < stages_; ++i) {
     largest = std::max(largest, probe_.segment(i * per_stage_, accelerations_).cwiseAbs().maxCoeff());
   }
@@ -319,11 +314,15 @@ template <bool Transposed>
 void StageMatrix::solve_factored(Eigen::Ref<Eigen::MatrixXd> b) {
   if (!use_sparse_) {
     for (Eigen::Index c = 0; c < b.cols(); ++c) solve_blocks<Transposed>(b.col(c));
-    return;
+  } else {
+    scale<Transposed>(b);
+    if (Transposed) {
+      sparse_->solve_transposed(b);
+    } else {
+      sparse_->solve(b);
+    }
+    scale<!Transposed>(b);
   }
-  scale<Transposed>(b);
-  Transposed ? sparse_->solve_transposed(b) : sparse_->solve(b);
-  scale<!Transposed>(b);
 }
 
 // Right-hand sides of the scaled matrix, from those of N; with Columns, solutions of N from its solutions (of N', from
@@ -338,25 +337,39 @@ void StageMatrix::scale(Eigen::Ref<Eigen::MatrixXd> b) const {
 // a = S^-1 (b_a + J'W b_lambda),  lambda = W (G a - b_lambda);  transposed with J and G exchanged.
 template <bool Transposed>
 void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
-  const Eigen::VectorXd &before = Transposed ? column_scale_ : row_scale_,
-                        &after = Transposed ? row_scale_ : column_scale_;
-  const auto lambda = [&](int i) { return b.segment(i * per_stage_ + accelerations_, W_.size()).array(); };
-  // f(accelerations of a body in a stage, their place in by_body_)
-  const auto for_each_body = [&](auto&& f) {
-    for (int i = 0; i < stages_; ++i) {
-      for (int body = 0; body < jacobian_->bodies(); ++body) {
-        f(b.segment<7>(i * per_stage_ + columns_of(body)), by_body_.segment<7>(body * blocks_->stride() + 7 * i));
-      }
+  for (int i = 0; i < stages_; ++i) b.segment(i * per_stage_ + accelerations_, W_.size()).array() *= W_.array();
+  if (Transposed) {
+    add_G_transposed(1, b, b);
+  } else {
+    add_J_transposed(1, b, b);
+  }
+  const Eigen::Index stride = blocks_->stride();
+  for (int i = 0; i < stages_; ++i) {
+    for (int body = 0; body < jacobian_->bodies(); ++body) {
+      by_body_.segment<7>(body * stride + 7 * i) = (Transposed ? column_scale_ : row_scale_)
+                                                       .head<7>()
+                                                       .cwiseProduct(b.segment<7>(i * per_stage_ + columns_of(body)));
     }
-  };
-  for (int i = 0; i < stages_; ++i) lambda(i) *= W_.array();
-  Transposed ? add_G_transposed(b, b) : add_J_transposed(b, b);
-  for_each_body([&](auto a, auto by_body) { by_body = before.head<7>().cwiseProduct(a); });
-  Transposed ? blocks_->solve_transposed(by_body_) : blocks_->solve(by_body_);
-  for_each_body([&](auto a, auto by_body) { a = after.head<7>().cwiseProduct(by_body); });
-  for (int i = 0; i < stages_; ++i) lambda(i) /= -W_.array();
-  Transposed ? add_J(b, b) : add_G(b, b);
-  for (int i = 0; i < stages_; ++i) lambda(i) *= W_.array();
+  }
+  if (Transposed) {
+    blocks_->solve_transposed(by_body_);
+  } else {
+    blocks_->solve(by_body_);
+  }
+  for (int i = 0; i < stages_; ++i) {
+    for (int body = 0; body < jacobian_->bodies(); ++body) {
+      b.segment<7>(i * per_stage_ + columns_of(body)) =
+          (Transposed ? row_scale_ : column_scale_).head<7>().cwiseProduct(by_body_.segment<7>(body * stride + 7 * i));
+    }
+    auto lambda = b.segment(i * per_stage_ + accelerations_, W_.size());
+    lambda.array() /= -W_.array();
+  }
+  if (Transposed) {
+    add_J(1, b, b);
+  } else {
+    add_G(1, b, b);
+  }
+  for (int i = 0; i < stages_; ++i) b.segment(i * per_stage_ + accelerations_, W_.size()).array() *= W_.array();
 }
 
 template <bool Transposed>
@@ -365,35 +378,42 @@ void StageMatrix::subtract_times(const Eigen::Ref<const Eigen::VectorXd>& x, Eig
     v_.setZero();
     q_.setZero();
   } else {
-    combine(x);
+    add_G(-1, x, y);  // leaves x combined
   }
   for (int i = 0; i < stages_; ++i) {
     const MotionJacobian::Values& of = *values_[at(i)];
     const Eigen::Index stage = i * per_stage_, combined = i * accelerations_;
-    jacobian_->for_each_block(of, [&]<class Block>(int row, int column, const Block& q, const Block& v) {
-      constexpr int kRows = Block::RowsAtCompileTime;
-      auto of_v = v_.segment<7>(combined + column), of_q = q_.segment<7>(combined + column);
-      if constexpr (Transposed) {
-        const Vec<kRows> beta = x.segment<kRows>(stage + row);
-        of_v.noalias() += v.transpose() * beta;
-        of_q.noalias() += q.transpose() * beta;
+    for (std::size_t k = 0; k < jacobian_->pairs().size(); ++k) {
+      const auto& p = jacobian_->pairs()[k];
+      auto v = v_.segment<7>(combined + columns_of(p.body)), q = q_.segment<7>(combined + columns_of(p.body));
+      if (Transposed) {
+        const Vec<7> beta = x.segment<7>(stage + columns_of(p.row));
+        v.noalias() += of.v[k].transpose() * beta;
+        q.noalias() += of.q[k].transpose() * beta;
       } else {
-        auto to = y.segment<kRows>(stage + row);
-        to.noalias() -= v * of_v;
-        to.noalias() -= q * of_q;
+        auto to = y.segment<7>(stage + columns_of(p.row));
+        to.noalias() -= of.v[k] * v;
+        to.noalias() -= of.q[k] * q;
       }
-    });
-    for_each_own_block(of, [&]<class Block>(auto row, auto column, const Block& block) {
-      constexpr int kRows = Block::RowsAtCompileTime, kColumns = Block::ColsAtCompileTime;
-      if constexpr (Transposed) {
-        y.segment<kColumns>(stage + column).noalias() -= block.transpose() * x.segment<kRows>(stage + row);
+    }
+    for (int b = 0; b < jacobian_->bodies(); ++b) {
+      auto to = y.segment<7>(stage + columns_of(b));
+      const auto a = x.segment<7>(stage + columns_of(b));
+      if (Transposed) {
+        to.noalias() -= of.mass[at(b)].transpose() * a;
       } else {
-        y.segment<kRows>(stage + row).noalias() -= block * x.segment<kColumns>(stage + column);
+        to.noalias() -= of.mass[at(b)] * a;
       }
-    });
+    }
     y.segment(stage + accelerations_, W_.size()) += of.compliance * x.segment(stage + accelerations_, W_.size());
   }
-  if (Transposed) spread(-1, y);
+  if (Transposed) {
+    spread(-1, y);
+    add_G_transposed(-1, x, y);
+    add_J(-1, x, y);
+  } else {
+    add_J_transposed(-1, x, y);
+  }
 }
 
 // v_i = sum_j P_ij a_j,  q_i = sum_j (P^2)_ij a_j
@@ -432,32 +452,37 @@ void StageMatrix::for_each_row(Function&& f) const {
   }
 }
 
-void StageMatrix::add_G(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
+void StageMatrix::add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
   combine(x);
   for_each_row([&](const auto& of, auto k, auto row, auto body, auto combined) {
-    y(row) += of.row_v[k].dot(v_.segment<7>(combined)) + of.row_q[k].dot(q_.segment<7>(combined)) +
-              of.J_Z[k].dot(x.segment<7>(body));
+    y(row) += sign * (of.row_v[k].dot(v_.segment<7>(combined)) + of.row_q[k].dot(q_.segment<7>(combined)) +
+                      of.J_Z[k].dot(x.segment<7>(body)));
   });
 }
 
-void StageMatrix::add_G_transposed(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
+void StageMatrix::add_G_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
+                                   Eigen::Ref<Eigen::VectorXd> y) {
   v_.setZero();
   q_.setZero();
   for_each_row([&](const auto& of, auto k, auto row, auto body, auto combined) {
-    v_.segment<7>(combined) += x(row) * of.row_v[k].transpose();
-    q_.segment<7>(combined) += x(row) * of.row_q[k].transpose();
-    y.segment<7>(body) += x(row) * of.J_Z[k].transpose();
+    const double lambda = x(row);
+    v_.segment<7>(combined) += lambda * of.row_v[k].transpose();
+    q_.segment<7>(combined) += lambda * of.row_q[k].transpose();
+    y.segment<7>(body) += (sign * lambda) * of.J_Z[k].transpose();
   });
-  spread(1, y);
+  spread(sign, y);
 }
 
-void StageMatrix::add_J(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
-  for_each_row([&](const auto& of, auto k, auto row, auto body, auto) { y(row) += of.J[k].dot(x.segment<6>(body)); });
-}
-
-void StageMatrix::add_J_transposed(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
+void StageMatrix::add_J(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
   for_each_row(
-      [&](const auto& of, auto k, auto row, auto body, auto) { y.segment<6>(body) += x(row) * of.J[k].transpose(); });
+      [&](const auto& of, auto k, auto row, auto body, auto) { y(row) += sign * of.J[k].dot(x.segment<6>(body)); });
+}
+
+void StageMatrix::add_J_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
+                                   Eigen::Ref<Eigen::VectorXd> y) {
+  for_each_row([&](const auto& of, auto k, auto row, auto body, auto) {
+    y.segment<6>(body) += (sign * x(row)) * of.J[k].transpose();
+  });
 }
 
 template void StageMatrix::refine<false>(Eigen::Ref<Eigen::MatrixXd>, int);

@@ -60,8 +60,6 @@ class StageMatrix {
   bool factor_blocks();
   void add_joint(const Joint& joint, int i, const MotionJacobian::Values& x);
   template <class Function>
-  void for_each_own_block(const MotionJacobian::Values& of, Function&& f) const;
-  template <class Function>
   void for_each_entry(Function&& f) const;
   bool factor_sparse();
   bool turn_to_sparse();
@@ -81,11 +79,11 @@ class StageMatrix {
   void spread(double sign, Eigen::Ref<Eigen::VectorXd> y);
   template <class Function>
   void for_each_row(Function&& f) const;
-  // Rows of Phi of y += G x, and the same of J;  accelerations of y += J' and G' times the multipliers of x.
-  void add_G(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
-  void add_J(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
-  void add_J_transposed(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
-  void add_G_transposed(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
+  // Rows of Phi of y += sign G x, and the same of J;  accelerations of y += sign J' and G' times the multipliers of x.
+  void add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
+  void add_J(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
+  void add_J_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
+  void add_G_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
 
   // Largest acceleration (row 0) of each column, and multiplier (row 1), in accelerations of what its row sees.
   using Sizes = Eigen::Array<double, 2, kLanes>;
