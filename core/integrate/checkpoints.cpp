@@ -142,7 +142,9 @@ bool Checkpoints::run_again(const Snapshot& from, long first, long last, Snapsho
 }
 
 std::span<const std::pair<long, SampleEvent>> Checkpoints::samples() const {
-  const auto [begin, end] = std::ranges::equal_range(events_, again_.index, {}, &std::pair<long, SampleEvent>::first);
+  const auto step = &std::pair<long, SampleEvent>::first;
+  const auto begin = std::ranges::lower_bound(events_, again_.index, {}, step);
+  const auto end = std::ranges::upper_bound(events_, again_.index, {}, step);
   return {begin, end};
 }
 
