@@ -126,17 +126,17 @@ bool Checkpoints::reverse_blocks(const Snapshot& from, long last, long block, lo
     }
     return true;
   }
-  Snapshot middle;
-  middle.step = from.step + block * binomial_split(blocks, snapshots);
-  if (!run_again(from, middle.step, middle.step, &middle)) return false;
+  const long split = from.step + block * binomial_split(blocks, snapshots);
+  if (!run_again(from, split, split)) return false;
+  const Snapshot middle = again_.end;
   count(bytes_of(middle));
   if (!reverse_blocks(middle, last, block, snapshots - 1)) return false;
   bytes_ -= bytes_of(middle);
   return reverse_blocks(from, middle.step, block, snapshots);
 }
 
-bool Checkpoints::run_again(const Snapshot& from, long first, long last, Snapshot* end) {
-  again_ = {from.step, first, last, end};
+bool Checkpoints::run_again(const Snapshot& from, long first, long last) {
+  again_ = {from.step, first, last, {}};
   recomputed_ += last - from.step;
   return replay_(from, last, *this);
 }
@@ -155,9 +155,10 @@ std::string Checkpoints::look_at(const SeenStep& step) {
     kept_.emplace_back(*step.stages, rk_, events);
     count(bytes_of(kept_.back()));
   }
-  if (++again_.index == again_.last && again_.end) {
-    again_.end->y0 = step.to.y;
-    again_.end->angles = step.to.angles;
+  if (++again_.index == again_.last) {
+    again_.end.step = again_.last;
+    again_.end.y0 = step.to.y;
+    again_.end.angles = step.to.angles;
   }
   return {};
 }

@@ -55,8 +55,8 @@ class Checkpoints : private StepObserver {
   void turn_steps_into_snapshots();
   bool reverse(const Snapshot& from, long last);
   bool reverse_blocks(const Snapshot& from, long last, long block, long snapshots);
-  // Computes steps from..last again and keeps those from `first` on. `end` becomes the state after them.
-  bool run_again(const Snapshot& from, long first, long last, Snapshot* end = nullptr);
+  // Computes steps from..last again and keeps those from `first` on.
+  bool run_again(const Snapshot& from, long first, long last);
   std::span<const std::pair<long, SampleEvent>> samples() const;  // in the step that is computed again
   bool reads_inside(double) const override { return again_.index >= again_.first && !samples().empty(); }
   std::string look_at(const SeenStep& step) override;
@@ -71,7 +71,7 @@ class Checkpoints : private StepObserver {
   std::vector<std::pair<long, SampleEvent>> events_;  // by step, where steps are not kept
   struct {
     long index = 0, first = 0, last = 0;  // of the next step
-    Snapshot* end = nullptr;
+    Snapshot end;                         // after the last one
   } again_;
   Replay replay_;
   StepBack back_;
