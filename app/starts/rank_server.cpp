@@ -1,4 +1,4 @@
-// What the ranks of mpirun other than 0 do.
+// The ranks of mpirun other than 0 serve rank 0.
 #include <fmt/format.h>
 
 #include <chrono>

@@ -23,7 +23,7 @@ namespace mbsopt {
 enum class Operation : unsigned char {
   number,  // a constant
   name,    // a free name; in a Program: an input
-  // Of two operands:
+  // These take two operands:
   add,
   subtract,
   multiply,
@@ -34,7 +34,7 @@ enum class Operation : unsigned char {
   max,
   smooth_abs,  // sqrt(a^2 + b^2)
   not_above,   // 1 where a <= b, else 0: the choice of min and max; only derivative programs use it
-  // Of one operand:
+  // These take one operand:
   negate,
   abs,
   sign,  // -1, 0 or 1: the derivative of abs; only derivative programs use it

@@ -45,8 +45,11 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, std::size_t order, double t0, 
     const double left = difference(a, b, t1 - t0);
     if (!std::isfinite(left) || std::abs(left) <= std::max(kJump * size, kRoundingOfLaw)) return {};
     const double middle = t0 + kPart * (t1 - t0), change = b[order] - a[order];
-    if (t1 - t0 <= shortest || middle <= t0 || middle >= t1)
-      return std::abs(change) > kSteep * wide ? Jump{t1, change} : Jump{};
+    if (t1 - t0 <= shortest || middle <= t0 || middle >= t1) {
+      // At the end of a steep ramp the slope explains the change, also where the ramp ends just within the interval.
+      const bool by_slope = std::abs(change) <= (t1 - t0) * (std::abs(a[order + 1]) + std::abs(b[order + 1]));
+      return !by_slope && std::abs(change) > kSteep * wide ? Jump{t1, change} : Jump{};
+    }
     if (t1 - t0 > kWide * shortest) wide = std::abs(change);
     const TimeLaw::Jet m = at(law, middle);
     if (std::abs(difference(a, m, middle - t0)) >= std::abs(difference(m, b, t1 - middle))) {

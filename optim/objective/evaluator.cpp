@@ -223,7 +223,7 @@ void Evaluator::find_unused() {
       user->parameters.clear();
     }
   }
-  // What is opaque may look at every body.
+  // Opaque code may look at every body.
   for (const SceneIssue& issue : find_unused_parameters(judged, opaque)) {
     const auto is_at = [&](int k) {
       return issue.path == "parameters." + scene_.parameters[static_cast<std::size_t>(k)].name;

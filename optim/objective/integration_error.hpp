@@ -28,7 +28,7 @@ Scene with_errors_times(double factor, Scene scene, long steps = 0);
 // The scene with ten times tighter tolerances, or looser ones; none if its steps are fixed.
 std::optional<Scene> with_other_tolerances(Scene scene, long steps = 0);
 
-// Of an evaluation with gradients, by a method of the caller's choice.
+// Estimates the error of an evaluation with gradients, by a method of the caller's choice.
 IntegrationError integration_error(const Evaluator& evaluator, const Evaluation& at,
                                    GradientMethod method = GradientMethod::automatic);
 
