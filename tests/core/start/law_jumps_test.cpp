@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>
-#include <cmath>
-#include <random>
 
 #include "core/mechanism/mechanism.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
@@ -15,7 +13,7 @@ using namespace mbsopt::testing;
 namespace {
 
 // What is said of the law of a drive that turns a rod, between two times.
-std::string words_about(const std::string& law, double from = 0, double to = 1) {
+std::string words_about(const std::string& law, double from, double to) {
   Scene s;
   s.bodies.push_back(plain_body("rod", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
   Joint hinge;
@@ -31,20 +29,20 @@ std::string words_about(const std::string& law, double from = 0, double to = 1) 
 
 }  // namespace
 
-TEST_CASE("the end of a steep ramp is no jump of the rate, a kink is one", "[law_jumps]") {
-  std::mt19937 random(3);
-  std::uniform_real_distribution<double> place(0.2, 0.8), exponent(-5, -3);
-  for (int i = 0; i < 4000; ++i) {
-    const double begin = place(random), width = std::pow(10, exponent(random));
-    const std::string x = fmt::format("min(1, max(0, (t - {:.17g})/{:.17g}))", begin, width);
-    const double end = begin + width, from = end - 0.1 * place(random), to = end + 0.1 * place(random);
+TEST_CASE("the end of a steep ramp is no jump of the rate, wherever the search for one ends", "[law_jumps]") {
+  // Begin and width of the ramp, and an interval around its end.
+  const double cases[][4] = {{0.6304, 0.0001648, 0.601549, 0.635429}, {0.6304, 0.0001648, 0.604711, 0.632621},
+                             {0.4389, 0.0002713, 0.420882, 0.459402}, {0.4389, 0.0002713, 0.424109, 0.455589},
+                             {0.2415, 0.0001476, 0.230571, 0.245941}, {0.2415, 0.0001476, 0.215128, 0.251948}};
+  for (const auto& [begin, width, from, to] : cases) {
+    const std::string x = fmt::format("min(1, max(0, (t - {})/{}))", begin, width);
     INFO(x << " from " << from << " to " << to);
-    CHECK(words_about(fmt::format("0.7*t + 0.2*({0})^2*(3 - 2*({0}))", x), from, to).empty());
+    CHECK(words_about(fmt::format("0.5*sin(2*t)^2 + 0.2*({0})^2*(3 - 2*({0}))", x), from, to).empty());
   }
-  for (int i = 0; i < 50; ++i) {
-    const double t = place(random);
-    INFO(t);
-    CHECK_THAT(words_about(fmt::format("0.7*t + 1e-4*max(0, t - {:.17g})", t)),
-               Catch::Contains("changes its rate by 0.0001 1/s"));
-  }
+}
+
+TEST_CASE("a kink of a law is a jump of its rate", "[law_jumps]") {
+  const double t = GENERATE(0.25, 0.3141, 0.5, 0.77777);
+  CHECK_THAT(words_about(fmt::format("0.7*t + 1e-4*max(0, t - {})", t), 0, 1),
+             Catch::Contains("changes its rate by 0.0001 1/s"));
 }
