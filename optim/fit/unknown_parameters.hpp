@@ -1,7 +1,7 @@
 // The unknowns of an identification: parameters shared by its experiments, and those with a value per experiment.
 //
 // clang-format off
-//   const std::vector<UnknownParameter> unknowns = unknowns_of_fit(scene, spec);   // "k1", "run1.theta0", "run2.theta0"
+//   const std::vector<UnknownParameter> unknowns = unknowns_of_fit(scene, spec);  // "k1", "run1.theta0", "run2.theta0"
 //   Experiment run1(..., unknowns_in(scene, spec, 0, unknowns));                   // those that act in experiment 0
 // clang-format on
 #pragma once
