@@ -46,7 +46,7 @@ struct LinePlot {
   std::string title, x_label, y_label;
   std::vector<PlotSeries> series = {};
   bool logarithmic_y = false;  // values <= 0 are left out
-  bool logarithmic_x = false;  // likewise
+  bool logarithmic_x = false;  // x <= 0 are left out
   bool whole_x = false;        // x counts: ticks at whole numbers only
   std::vector<PlotLimit> limits = {};
   std::vector<PlotInstant> instants = {};

@@ -24,7 +24,7 @@ class MotionBlocks {
   template <int Rows>
   struct Block {
     Mat<Rows, 7> q = Mat<Rows, 7>::Zero(), v = Mat<Rows, 7>::Zero();
-    int parts = 0;  // nonempty parts; a part filled once counts as filled
+    int parts = 0;  // those that add() has filled
 
     // Adds the columns of a part. r and rdot may come with a fourth column, which must be zero.
     template <class Columns>

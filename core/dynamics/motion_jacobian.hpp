@@ -26,7 +26,7 @@ class MotionJacobian {
     std::vector<Row> row_q, row_v;  // per row and body
     std::vector<Block> mass;        // per body
     std::vector<Row> J_Z;           // per row and body
-    std::vector<Mat<1, 6>> J;       // the same
+    std::vector<Mat<1, 6>> J;       // per row and body
     double compliance = 0;          // of every row
   };
 

@@ -21,7 +21,7 @@ struct AppliedForce {
   int slot = -1;
   std::array<Program, 3> components;  // inputs: all parameters, t, all sensors of the scene
   std::vector<int> parameters;        // used by the components
-  std::vector<int> sensors;           // the same
+  std::vector<int> sensors;           // used by the components
 
   void add_load(const Vector3d& c, const Frame& f, Vec<6>& load) const;
 

@@ -93,7 +93,7 @@ class StageMatrix {
   int stages_;
   Eigen::Index accelerations_, per_stage_;
   Eigen::VectorXd mobility_;                  // per row of Phi: 1/inertia
-  Eigen::VectorXd epsilon_;                   // the same
+  Eigen::VectorXd epsilon_;                   // per row of Phi: its compliance
   Eigen::VectorXd row_scale_, column_scale_;  // of the equations and unknowns of a stage, as they are factored
   MotionJacobian::Block scale_;               // both, of an entry of two bodies
   std::vector<Joint> joints_;

@@ -142,7 +142,7 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
       point.message = run.message;
       return;
     }
-    if (reads_velocities && !reads_velocities_) {  // with their derivatives
+    if (reads_velocities && !reads_velocities_) {  // the run must compute their derivatives, too
       reads_velocities_ = true;
       point.z.setZero();
       point.z_x.setZero();

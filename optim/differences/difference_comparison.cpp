@@ -14,7 +14,7 @@ namespace mbsopt::inline optim {
 namespace {
 
 constexpr double kStep = 1e-3;     // of the variable's size
-constexpr double kShorter = 16;    // times
+constexpr double kShorter = 16;    // a second step is so many times shorter
 constexpr double kApart = 1e-2;    // of a derivative: less is harmless for an optimiser
 constexpr double kMatters = 1e-3;  // of the group's largest derivative
 constexpr double kTrust = 10;      // times an estimated error

@@ -15,7 +15,7 @@ namespace mbsopt::inline optim {
 
 struct BoundCosts {
   std::shared_ptr<const RunningCost> running;    // null where there is none
-  std::shared_ptr<const TerminalCost> terminal;  // likewise
+  std::shared_ptr<const TerminalCost> terminal;  // null where there is none
 };
 
 // place is that of the spec in the problem, for messages. Throws std::invalid_argument for unknown names and for costs

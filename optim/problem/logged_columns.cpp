@@ -21,7 +21,7 @@ struct ColumnUnit {
   Unit unit;
 };
 
-// given: instead of the header's; empty: none.
+// The unit that the file states for a column, or the one of its header; empty if neither does.
 std::string stated(const std::string& header, const std::string& given) {
   return given.empty() ? std::string(parts_of_header(header).unit.value_or("")) : given;
 }

@@ -33,8 +33,8 @@ struct NamedForce {
 struct NamedCost {
   std::string name;
   std::vector<std::string> parameters;
-  std::shared_ptr<const RunningCost> running;    // either may be absent (null)
-  std::shared_ptr<const TerminalCost> terminal;  // likewise
+  std::shared_ptr<const RunningCost> running;    // may be absent (null)
+  std::shared_ptr<const TerminalCost> terminal;  // may be absent (null)
 };
 // The value (order 0) and derivatives at x of a smooth function. curve.hpp lists the required orders.
 struct NamedLaw {

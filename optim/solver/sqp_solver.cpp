@@ -127,7 +127,7 @@ class SqpSearch : private NlpSearch {
   }
 
   const MatrixXd& B() const { return uses_given_ && given_.size() > 0 ? given_ : learnt_; }
-  // Whether little damping makes it positive definite.
+  // Whether a little damping makes a curvature positive definite.
   static bool is_usable(MatrixXd H) {
     constexpr double kNegative = 1e-2;  // of the largest curvature
     H.diagonal().array() += kNegative * std::max(H.diagonal().maxCoeff(), 0.0);
