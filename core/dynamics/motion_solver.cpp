@@ -22,6 +22,7 @@ const Motion& MotionSolver::motion(const StatePoint& at) {
   if (at.t == t_ && at.y == y_) return motion_;
   t_ = at.t;
   y_ = at.y;
+  linearised_ = false;
   if (dynamics_.evaluate(at.t, at.y, at.angles, ydot_)) {
     motion_.z = dynamics_.z();
     motion_.lambda = dynamics_.lambda();
@@ -35,7 +36,8 @@ const Motion& MotionSolver::motion(const StatePoint& at) {
 void MotionSolver::fold_bar(const StatePoint& at, Eigen::Ref<Eigen::VectorXd> y_bar,
                             Eigen::Ref<Eigen::VectorXd> rho_bar) {
   motion(at);
-  dynamics_.linearise_here();
+  if (!linearised_) dynamics_.linearise_here();
+  linearised_ = true;
   y_bar_.setZero();
   theta_bar_.setZero();
   rho_bar_.setZero();

@@ -19,6 +19,7 @@ class MotionSolver final : public MotionSource {
   SpatialDynamics dynamics_;
   Motion motion_, bar_;
   double t_ = 0;
+  bool linearised_ = false;  // at this state
   Eigen::VectorXd y_, ydot_, w_, y_bar_, theta_bar_, rho_bar_;
 };
 

@@ -32,6 +32,17 @@ double Mechanism::sensor_value(int sensor, const StatePoint& at) const {
 
 double Mechanism::add_sensor_gradient(int sensor, const StatePoint& at, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
                                       Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+  const double value = add_unfolded_gradient(sensor, at, scale, y_bar, rho_bar);
+  if (reads_motion(sensor)) at.motion->fold_bar(at, y_bar, rho_bar);
+  return value;
+}
+
+bool Mechanism::reads_motion(int sensor) const {
+  return data_->sensors[static_cast<std::size_t>(sensor)]->reads == Reads::motion;
+}
+
+double Mechanism::add_unfolded_gradient(int sensor, const StatePoint& at, double scale,
+                                        Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
   SensorGradient to{*data_, scale, y_bar, rho_bar};
   return data_->sensors[static_cast<std::size_t>(sensor)]->evaluate(*data_, at, &to);
 }

@@ -38,6 +38,11 @@ class Mechanism {
   double sensor_value(int sensor, const StatePoint& at) const;
   double add_sensor_gradient(int sensor, const StatePoint& at, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
                              Eigen::Ref<Eigen::VectorXd> rho_bar) const;
+  // The part of a gradient in accelerations and multipliers waits in at.motion->bar(), where those of several sensors
+  // add up, until its fold_bar().
+  double add_unfolded_gradient(int sensor, const StatePoint& at, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
+                               Eigen::Ref<Eigen::VectorXd> rho_bar) const;
+  bool reads_motion(int sensor) const;
 
   const MechanismData& data() const { return *data_; }
 

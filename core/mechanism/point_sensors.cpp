@@ -130,7 +130,6 @@ double PointSensor::evaluate(const MechanismData&, const StatePoint& at, SensorG
   };
   add(A, a, 1);
   if (relative) add(B, b, -1);
-  if (moves) at.motion->fold_bar(at, to->y_bar, to->rho_bar);
   return result;
 }
 

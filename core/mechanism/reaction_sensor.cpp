@@ -57,9 +57,7 @@ void add_pull_back_of_loads(const ReactionSensor& s, const Eigen::VectorXd& y, c
 double ReactionSensor::evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const {
   assert(at.motion);
   const Motion& motion = at.motion->motion(at);
-  const double value = evaluate(d, at.y, motion.lambda, to, to ? &at.motion->bar().lambda : nullptr);
-  if (to) at.motion->fold_bar(at, to->y_bar, to->rho_bar);
-  return value;
+  return evaluate(d, at.y, motion.lambda, to, to ? &at.motion->bar().lambda : nullptr);
 }
 
 double ReactionSensor::evaluate(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,

@@ -59,7 +59,6 @@ struct SpecificForceSensor final : SensorFunction {
     to->add_slot<3>(axis.slot, Vec<3>(b.A.transpose() * W));
     to->add_slot<3>(d.slot_gravity, Vec<3>(-along));
     add_acceleration(at, point, along, *to);
-    at.motion->fold_bar(at, to->y_bar, to->rho_bar);
     return along.dot(W);
   }
 };

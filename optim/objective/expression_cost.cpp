@@ -51,6 +51,8 @@ class ExpressionCost : public PointCost {
     const std::vector<int>& active = mechanism.data().active;
     for (const int k : compiled_->parameters)
       if (std::find(active.begin(), active.end(), k) != active.end()) active_.push_back(k);
+    reads_motion_ =
+        std::ranges::any_of(compiled_->sensors, [&](const auto& used) { return mechanism_.reads_motion(used.sensor); });
   }
 
   double value(const StatePoint& at) const override {
@@ -68,8 +70,9 @@ class ExpressionCost : public PointCost {
     for (const auto& [input, sensor] : compiled_->sensors) {
       const double weight = s.gradient[index(input)];
       if (weight != 0 || !compiled_->slopes_read_sensors)
-        s.x[index(input)] = mechanism_.add_sensor_gradient(sensor, at, weight, y_bar, rho_bar);
+        s.x[index(input)] = mechanism_.add_unfolded_gradient(sensor, at, weight, y_bar, rho_bar);
     }
+    if (reads_motion_) at.motion->fold_bar(at, y_bar, rho_bar);
     return compiled_->slopes_read_sensors ? value : compiled_->program.value(inputs(s.x), s.program);
   }
 
@@ -97,6 +100,7 @@ class ExpressionCost : public PointCost {
   std::shared_ptr<const Compiled> compiled_;
   Mechanism mechanism_;      // shares the compiled scene
   std::vector<int> active_;  // parameters used directly with respect to which derivatives are wanted
+  bool reads_motion_ = false;
 };
 
 }  // namespace
