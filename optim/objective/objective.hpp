@@ -35,6 +35,7 @@ namespace mbsopt::inline optim {
 struct ObjectivePart {
   int side = 0;
   double factor = 1;
+  double softness = 1;  // a factor of the sharpness, for extremes so sharp that the steps do not resolve them
 };
 
 class Objective {
@@ -81,7 +82,9 @@ class Objective {
   // for free ones.
   const std::vector<Sample>& residuals() const { return residuals_; }
   bool is_sum_of_squares() const;
-  double exponent(const ObjectivePart& part) const { return part.side * sharpness_; }  // k of an extreme
+  double exponent(const ObjectivePart& part) const {
+    return part.side * part.softness * sharpness_;
+  }                                                                // k of an extreme
   bool is_of_linear_motion() const { return mode_ || response_; }  // an eigenvalue, a frequency response
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
   const ObjectiveSpec& spec() const { return spec_; }  // of one that is not

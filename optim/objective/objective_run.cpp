@@ -59,6 +59,22 @@ bool in_range(const std::vector<ObjectiveMean>& means, const VectorXd& values) {
   return true;
 }
 
+// Makes extremes softer whose exponentials the steps do not resolve, unless the file gives their sharpness. Of large
+// values the default is far too much. Returns whether there is one.
+bool soften(std::vector<ObjectiveMean>& means, const VectorXd& values) {
+  bool found = false;
+  for (std::size_t k = 0; k < means.size(); ++k) {
+    auto& [objective, row, part, x0] = means[k];
+    const double size = std::abs(objective->exponent(part) * x0);
+    if (part.side == 0 || objective->is_written_in_cpp() || objective->spec().sharpness) continue;
+    if (std::isfinite(objective->of_integral(values(static_cast<Index>(k)), part, x0).value)) continue;
+    if (!(size > ObjectiveSpec::kSharpness)) continue;
+    part.softness = ObjectiveSpec::kSharpness / size;
+    found = true;
+  }
+  return found;
+}
+
 std::vector<Cost> together(std::span<const Cost> costs, const std::vector<Cost>& others) {
   std::vector<Cost> all(costs.begin(), costs.end());
   all.insert(all.end(), others.begin(), others.end());
@@ -109,6 +125,7 @@ SimulationResult run_objectives(const std::vector<Objective>& objectives, const 
   if (complete && !in_range(means, result.psi)) {
     set_x0(means, mechanism, settings, result.steps, progress);
     result = sweep(costs());
+    if (result.ok() && soften(means, result.psi)) result = sweep(costs());
   }
   if (!result.ok()) return result;
   const VectorXd I = result.psi;

@@ -70,6 +70,19 @@ TEST_CASE("a smooth maximum is the exponential mean, below the true one, which i
   CHECK(*true_value(problem) == Approx(0.3).epsilon(1e-8));
 }
 
+TEST_CASE("an extreme without a sharpness is smooth enough for its size", "[objective]") {
+  Problem problem = problem_with(maximum("1e6*x", 1));
+  problem.objectives[0].sharpness.reset();
+  for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
+    const Evaluation e = evaluated(problem, method);
+    INFO(e.message);
+    REQUIRE(e.ok);
+    CHECK(e.psi(0) == Approx(1e6 * smooth_maximum(100 / 0.3, 0)).epsilon(1e-6));
+    CHECK(e.psi_rho(0, 1) == Approx(e.psi(0) / 0.3).epsilon(0.02));  // in a; the sharpness does not grow with it
+  }
+  CHECK(*true_value(problem) == Approx(3e5).epsilon(1e-8));
+}
+
 TEST_CASE("a smooth maximum far from zero does not leave the range of numbers", "[objective]") {
   // exp(30 * 400) is infinite, exp(-30 * 400) is zero
   const std::string offset = GENERATE(as<std::string>{}, "400", "-400");
