@@ -223,10 +223,14 @@ bool ForwardRun::step_is_followed(double h) {
   return false;
 }
 
+StatePoint ForwardRun::inside(double t) {
+  require(CVodeGetDky(memory(), t, 0, y_sample_));
+  return flow_.point(t, *y_sample_);
+}
+
 void ForwardRun::take_samples(SampleSchedule& schedule, double t) {
   for (const SampleEvent& e : schedule.take(t)) {
-    require(CVodeGetDky(memory(), e.time, 0, y_sample_));
-    const StatePoint at = flow_.point(e.time, *y_sample_);
+    const StatePoint at = inside(e.time);
     if (e.cost) result_.psi(e.objective) += e.cost->value(at);
     follower_->take_sample(e, at);
   }
@@ -296,6 +300,7 @@ void ForwardRun::go(std::span<const double> observed, Follower& follower) {
     t = result_.last_good_time = step.to.t;
     take_samples(schedule, t);
     follower.take_step(step.to);
+    if (follower.look_inside) follower.look_inside({step.from.t, t, {}, [&](double at) { return inside(at); }});
     return std::string();
   });
   std::optional<JumpWatch> jumps;

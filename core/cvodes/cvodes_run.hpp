@@ -31,7 +31,7 @@ inline double parameter_size(double rho) { return rho == 0 ? 1 : std::abs(rho); 
 
 // A follower takes the steps and samples of a forward run: it observes the samples, or carries derivatives along.
 struct Follower {
-  explicit Follower(const Sampling& sampling = {}) : observe(sampling.observe) {}
+  explicit Follower(const Sampling& sampling = {}) : observe(sampling.observe), look_inside(sampling.look_inside) {}
   virtual ~Follower() = default;
   virtual bool differentiates() const { return false; }
   // Takes one step towards end.
@@ -44,6 +44,7 @@ struct Follower {
   virtual void count(void* /*memory*/, long& /*failed_error_tests*/, long& /*iterations*/) const {}
 
   std::function<void(std::size_t index, const StatePoint& at)> observe;
+  std::function<void(const StepInside&)> look_inside;
 };
 
 class ForwardRun {
@@ -86,6 +87,7 @@ class ForwardRun {
   bool step_is_followed(double h);
   double stop_before_pulse(double t, PulseWatch& pulses);
   bool advance(double t, double& t1);
+  StatePoint inside(double t);  // the last step, until the next call
   void take_samples(SampleSchedule& schedule, double t);
   void add_integrals();
   void count_steps();  // rejected ones, and the work of their solutions

@@ -6,6 +6,7 @@
 #include <array>
 #include <boost/math/interpolators/barycentric_rational.hpp>
 #include <cmath>
+#include <iterator>
 
 #include "core/body/hermite.hpp"
 #include "core/body/state_layout.hpp"
@@ -120,10 +121,10 @@ SimulationResult DrivenRun::finish() {
   return std::move(result_);
 }
 
-void DrivenRun::go(const Take& take) {
+void DrivenRun::go(const Take& take, const std::function<void(const StepInside&)>& look_inside) {
   const Energy e = energy(mechanism_.data(), path_.state().y, path_.state().angles);
   result_.statistics.energy_initial = result_.statistics.energy_final = e.kinetic + e.potential;
-  go_through_panels(take);
+  go_through_panels(take, look_inside);
   result_.y_end = path_.state().y;
   if (!result_.ok()) return;
   if (!take_terminal_costs(take)) return stop_at_singular_matrix();
@@ -133,7 +134,7 @@ void DrivenRun::go(const Take& take) {
                not_finite_costs(costs_, result_.psi) + (singular.empty() ? "" : "; " + singular));
 }
 
-void DrivenRun::go_through_panels(const Take& take) {
+void DrivenRun::go_through_panels(const Take& take, const std::function<void(const StepInside&)>& look_inside) {
   const double end = settings_.end_time;
   if (is_too_fast()) return;
   if (differentiated_ && !frozen_) {
@@ -163,6 +164,7 @@ void DrivenRun::go_through_panels(const Take& take) {
     if (std::string jump = frozen_ ? std::string() : law_jumps_.between(t, resume); !jump.empty())
       return result_.stop(SimulationStatus::not_credible, std::move(jump));
     if (!take_panel(t1, take)) return stop_at_singular_matrix();
+    if (look_inside) show_panel(look_inside);
     end_panel(t, t1);
     if (jumps_) jumps_->look_at({point_of(from_), point()});
     report_step(point(), options_, result_);
@@ -225,6 +227,7 @@ void DrivenRun::stop_at_singular_matrix() {
 void DrivenRun::add_quadrature_errors() {
   SimulationStatistics& s = result_.statistics;
   for (const Integral& r : running_) {
+    if (r.of->rtol > 0) continue;
     QuadratureError& worst = r.of->is_extreme ? s.extreme_quadrature : s.quadrature;
     if (r.error > worst.error * r.absolute) worst = {r.error / r.absolute, r.of->name, r.worst_t};
   }
@@ -262,8 +265,9 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
 double DrivenRun::allowed_error(const Integral& r, double h) const {
   const IntegratorSettings& s = settings_.integrator;
   // Exponentials of smooth extremes have any size, so atol does not apply to them.
-  const double of_panel = s.rtol * r.panel.absolute + (r.of->is_extreme ? 0 : s.atol * h);
-  return std::max(of_panel, kPartOfRun * s.rtol * (r.absolute + r.panel.absolute));
+  const double rtol = std::max(s.rtol, r.of->rtol);
+  const double of_panel = rtol * r.panel.absolute + (r.of->is_extreme ? 0 : s.atol * h);
+  return std::max(of_panel, kPartOfRun * rtol * (r.absolute + r.panel.absolute));
 }
 
 // A peak as wide as the distance of the instants, which differs by D from the polynomial there, adds D times the
@@ -349,6 +353,23 @@ bool DrivenRun::take_panel(double t1, const Take& take) {
   if (!take_events_until(INFINITY, events, take)) return false;
   path_.start(end);
   return true;
+}
+
+// States inside are solved from the last one before, or from the node before them.
+void DrivenRun::show_panel(const std::function<void(const StepInside&)>& look_inside) {
+  const DrivenState end = path_.state();
+  std::vector<double> known{from_.t};
+  for (const DrivenState& node : nodes_) known.push_back(node.t);
+  known.push_back(end.t);
+  path_.start(from_);
+  look_inside({from_.t, end.t, known, [&](double t) {
+                 const auto after = std::ranges::upper_bound(nodes_, t, {}, &DrivenState::t);
+                 const DrivenState& before = t >= end.t ? end : after == nodes_.begin() ? from_ : *std::prev(after);
+                 if (!(path_.state().t <= t && path_.state().t >= before.t)) path_.start(before);
+                 if (!go_to(t)) y_.setConstant(mechanism_.states(), NAN);
+                 return path_.state().t == t ? point() : StatePoint{t, y_, from_.angles, continued()};
+               }});
+  path_.start(end);
 }
 
 bool DrivenRun::take_events_until(double t, std::span<const SampleEvent>& events, const Take& take) {

@@ -53,7 +53,8 @@ class DrivenRun {
             MotionSource* motion = nullptr);
 
   // Computes psi of the result, and calls take at every instant. In runs with derivatives, take counts the values.
-  void go(const Take& take);
+  // look_inside of Sampling sees each panel.
+  void go(const Take& take, const std::function<void(const StepInside&)>& look_inside = {});
   SimulationResult& result() { return result_; }
   // Adds the value of a term that counts; it is NaN if it has no limit at a singular position.
   void count(const DrivenTerm& term, double value, double t);
@@ -75,7 +76,8 @@ class DrivenRun {
     PanelIntegral panel{};                                   // over it
     double absolute = 0, error = 0, worst = 0, worst_t = 0;  // of |g| so far; of its panels, the largest, and when
   };
-  void go_through_panels(const Take& take);
+  void go_through_panels(const Take& take, const std::function<void(const StepInside&)>& look_inside);
+  void show_panel(const std::function<void(const StepInside&)>& look_inside);
   bool is_too_fast();
   double next_end();
   void try_shorter(Panel outcome, double t1);

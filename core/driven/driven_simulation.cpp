@@ -176,11 +176,13 @@ SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSet
                                  std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options,
                                  const Assembly& start) {
   DrivenRun run(mechanism, settings, costs, sampling.times, options, start, false);
-  run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
-    for (const DrivenTerm& term : terms)
-      if (!term.cost && sampling.observe) sampling.observe(term.observation, at);
-    return true;
-  });
+  run.go(
+      [&](const StatePoint& at, std::span<const DrivenTerm> terms) {
+        for (const DrivenTerm& term : terms)
+          if (!term.cost && sampling.observe) sampling.observe(term.observation, at);
+        return true;
+      },
+      sampling.look_inside);
   return run.finish();
 }
 

@@ -41,11 +41,10 @@ ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& set
       quadrature_(mechanism, method_, costs, QuadratureWatch::Of::values, motion()),
       y_(mechanism.states()) {}
 
-void ForwardRun::go(std::span<const double> observed, Observe observe, const RunOptions& options,
-                    const Follow& follow) {
+void ForwardRun::go(const Sampling& sampling, const RunOptions& options, const Follow& follow) {
   if (!result_.ok()) return;
-  schedule_.emplace(costs_, observed, settings_.end_time);
-  observe_ = std::move(observe);
+  schedule_.emplace(costs_, sampling.times, settings_.end_time);
+  sampling_ = &sampling;
   judges_ = !options.frozen;
   bool followed = true;
   ObserverOf follower([&](const SeenStep& seen) {
@@ -76,6 +75,8 @@ std::string ForwardRun::look_at(const SeenStep& seen) {
   add_running_costs(step);
   std::string objection = judges_ ? quadrature_.end_step(step) : "";
   if (objection.empty()) sample(step);
+  if (objection.empty() && sampling_->look_inside)
+    sampling_->look_inside({step.t, step.t1, {}, [&](double t) { return inside(step, t); }});
   return objection;
 }
 
@@ -95,15 +96,19 @@ void ForwardRun::add_running_costs(const Step& step) {
   }
 }
 
+StatePoint ForwardRun::inside(const Step& step, double t) {
+  dense_output(method_, step, (t - step.t) / step.h, y_);
+  return {t, y_, step.angles0, motion()};
+}
+
 void ForwardRun::sample(const Step& step) {
   for (const SampleEvent& e : samples_) {
-    if (!e.cost && !observe_) continue;
-    dense_output(method_, step, (e.time - step.t) / step.h, y_);
-    const StatePoint at{e.time, y_, step.angles0, motion()};
+    if (!e.cost && !sampling_->observe) continue;
+    const StatePoint at = inside(step, e.time);
     if (e.cost)
       result_.psi(e.objective) += e.cost->value(at);
     else
-      observe_(e.index, at);
+      sampling_->observe(e.index, at);
   }
 }
 

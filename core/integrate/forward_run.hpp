@@ -24,14 +24,13 @@ class ForwardRun : private StepObserver {
  public:
   // False where a factorisation failed.
   using Follow = std::function<bool(const Step&, std::span<const SampleEvent>)>;
-  using Observe = std::function<void(std::size_t, const StatePoint&)>;
 
   // Throws std::invalid_argument where settings name no Runge-Kutta method, or one that lacks a step.
   ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
              Assembly assembly);
 
-  // observed: times [s] at which `observe` sees the state. `follow` may be empty.
-  void go(std::span<const double> observed, Observe observe, const RunOptions& options, const Follow& follow);
+  // `follow` may be empty.
+  void go(const Sampling& sampling, const RunOptions& options, const Follow& follow);
 
   const Method& method() const { return method_; }
   const Assembly& assembly() const { return assembly_; }
@@ -43,9 +42,10 @@ class ForwardRun : private StepObserver {
 
  private:
   // The values of costs and samples of a step.
-  bool reads_inside(double t1) const override { return schedule_->due(t1); }
+  bool reads_inside(double t1) const override { return sampling_->look_inside || schedule_->due(t1); }
   std::string look_at(const SeenStep& step) override;
   void add_running_costs(const Step& step);
+  StatePoint inside(const Step& step, double t);  // by dense output, until the next call
   void sample(const Step& step);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 
@@ -60,7 +60,7 @@ class ForwardRun : private StepObserver {
   bool judges_ = true;  // given steps have been judged where they were found
   std::optional<SampleSchedule> schedule_;
   std::span<const SampleEvent> samples_;  // in the present step
-  Observe observe_;
+  const Sampling* sampling_ = nullptr;    // of the run that goes on
   double shift_in_time_ = 0;
   Eigen::VectorXd y_, angles_end_;
 };

@@ -72,6 +72,7 @@ struct Cost {
   std::vector<SampledCost> samples;
   std::string name = {};    // of the objective, for messages
   bool is_extreme = false;  // running is the exponential of a smooth maximum, which may leave the range of numbers
+  double rtol = 0;  // of a solved run's integral, if that is larger than the integrator's: it only shows the peaks
 };
 
 // Names the costs that have no finite value.

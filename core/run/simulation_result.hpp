@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -121,10 +122,18 @@ struct SimulationResult {
   }
 };
 
+// An accepted step, with its states.
+struct StepInside {
+  double t0, t1;
+  std::span<const double> solved;                       // ascending: the instants in it that a solved run knows
+  const std::function<StatePoint(double t)>& state_at;  // valid until the next call
+};
+
 // Observes states at given times (ascending, within the simulated span) through dense output. It never forces a step.
 struct Sampling {
   std::vector<double> times;
   std::function<void(std::size_t index, const StatePoint& at)> observe;
+  std::function<void(const StepInside&)> look_inside = {};  // called after each accepted step; may be empty
 };
 // The same with derivatives: y_rho is dy/drho at that time, 14n x P. at.ydot is set.
 struct TangentSampling {

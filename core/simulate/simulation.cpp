@@ -40,7 +40,7 @@ RunOptions with_exact_stages(RunOptions options) {
 SimulationResult integrate(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                            const Sampling& sampling, const RunOptions& options, Assembly start) {
   ForwardRun run(mechanism, settings, costs, std::move(start));
-  run.go(sampling.times, sampling.observe, options, {});
+  run.go(sampling, options, {});
   return run.finish();
 }
 
@@ -53,7 +53,7 @@ SimulationResult integrate_tlm(const Mechanism& mechanism, const SimulationSetti
   if (!result.ok()) return run.finish();
   TangentSweep sweep(mechanism, settings, run.method(), costs, sampling, run.assembly().tangent(), !options.frozen,
                      result.psi_rho);
-  run.go(sampling.times, {}, with_exact_stages(options),
+  run.go({sampling.times, {}}, with_exact_stages(options),
          [&](const Step& step, std::span<const SampleEvent> events) { return sweep.follow(step, events); });
   if (result.ok()) sweep.finish(run.end());
   sweep.add_to(result.statistics);
@@ -67,7 +67,7 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   Checkpoints checkpoints(run.method(), settings.adjoint_memory_mib);
-  run.go({}, {}, with_exact_stages(options), [&](const Step& step, std::span<const SampleEvent> events) {
+  run.go({}, with_exact_stages(options), [&](const Step& step, std::span<const SampleEvent> events) {
     checkpoints.keep(step, events);
     return true;
   });

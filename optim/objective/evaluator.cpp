@@ -472,6 +472,14 @@ Evaluation Evaluator::gradients_on(const StepSequence& steps, const Eigen::Vecto
   return e;
 }
 
+// Each peak of a true extreme has a gradient of its own.
+std::size_t Evaluator::gradients_per_run() const {
+  std::size_t count = 0;
+  for (const Objective& o : objectives_)
+    if (o.needs_simulation()) count += options_.true_extremes && o.is_extreme() ? kMostPeaks * o.parts().size() : 1;
+  return count;
+}
+
 // Returns the requested method, or the one that replaces it; `choice` gives the reason if it is not obvious.
 GradientMethod Evaluator::chosen_method(std::string& choice) const {
   using enum GradientMethod;
@@ -481,10 +489,12 @@ GradientMethod Evaluator::chosen_method(std::string& choice) const {
   const GradientMethod forward = by_cvodes ? cvodes_forward : tlm, backward = by_cvodes ? cvodes_adjoint : adjoint;
   if (simulated_ == 0) return tlm;  // nothing to simulate: the objectives' own derivatives
   if (asked == automatic) {
-    const GradientCost cost = gradient_cost(variables_.size(), simulated_);
+    const std::size_t rows = gradients_per_run();
+    const GradientCost cost = gradient_cost(variables_.size(), rows);
     const GradientMethod method = cost.tlm <= cost.adjoint ? forward : backward;
     choice = fmt::format("{}: {}, {}; estimated cost in simulations: {} {:.1f}, {} {:.1f}", to_string(method),
-                         counted(variables_.size(), "variable"), counted(simulated_, "objective"), to_string(forward),
+                         counted(variables_.size(), "variable"),
+                         counted(rows, rows > simulated_ ? "objective and peak" : "objective"), to_string(forward),
                          cost.tlm, to_string(backward), cost.adjoint);
     return method;
   }

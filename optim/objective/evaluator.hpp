@@ -159,6 +159,7 @@ class Evaluator {
   bool add_parameters_only(Evaluation& e) const;
   bool has_finite_objectives(Evaluation& e) const;
   bool is_last(const Eigen::VectorXd& rho) const;
+  std::size_t gradients_per_run() const;
   GradientMethod chosen_method(std::string& choice) const;
   void add_differences(Evaluation& e) const;
   void find_unused();

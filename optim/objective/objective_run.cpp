@@ -81,17 +81,16 @@ std::vector<Cost> together(std::span<const Cost> costs, const std::vector<Cost>&
   return all;
 }
 
-// The pieces of one side. values: of each peak at its instant and at its top, from `first` on, which goes on to the
-// next side. The top is higher but for kinks.
+// The pieces of one side. values: of each peak, from `first` on, which goes on to the next side.
 std::vector<ExtremePiece> pieces_of(const ObjectiveMean& side, const std::vector<Peak>& peaks, const VectorXd& values,
                                     const MatrixXd& values_rho, Index& first) {
-  const auto [sign, factor] = side.part;
+  const int sign = side.part.side;
+  const double factor = side.part.factor;
   std::vector<ExtremePiece> found;
   for (const Peak& peak : peaks) {
-    const Index best = sign * values(first) >= sign * values(first + 1) ? first : first + 1;
-    found.push_back({side.row, static_cast<int>(sign * factor), factor * values(best),
-                     factor * values_rho.row(best).transpose(), peak.t});
-    first += 2;
+    found.push_back({side.row, static_cast<int>(sign * factor), factor * values(first),
+                     factor * values_rho.row(first).transpose(), peak.t});
+    ++first;
   }
   return found;
 }
@@ -155,25 +154,23 @@ ExtremeRun::ExtremeRun(const std::vector<Objective>& objectives, const Simulatio
     : objectives_(objectives), settings_(settings), options_(options), sides_(means_of(objectives, true, false)) {}
 
 bool ExtremeRun::find(const Mechanism& mechanism) {
+  constexpr double kRtolOfShapes = 1e-4;  // panels that integrate a peak so well have nodes on both sides of it
   const std::vector<Watched> watched = watched_in(sides_, mechanism);
   std::vector<Cost> shapes;  // of the extremes, which panels of a solved run resolve
   for (std::size_t k = 0; k < sides_.size() && may_be_solved(mechanism, settings_); ++k) {
     Cost& shape = shapes.emplace_back();
     shape.name = sides_[k].objective->name();
     shape.running = watched[k].x;
+    shape.rtol = kRtolOfShapes;
   }
+  PeakWatch watch(watched, settings_);
   const auto simulated = [&](std::span<const Cost> costs) {
     ++simulations;
-    return simulate(mechanism, settings_, together(costs, shapes), {}, options_);
+    return simulate(mechanism, settings_, together(costs, shapes), watch.sampling(), options_);
   };
   result = run_objectives(objectives_, mechanism, settings_, simulated, options_.progress, false);
   if (!result.ok()) return false;
-  peaks_ = peaks(watched, mechanism, settings_, result.steps, options_.progress);
-  if (peaks_.size() < sides_.size()) {
-    result.status = SimulationStatus::stopped;
-    result.message = "the run that looks for extremes failed";
-    return false;
-  }
+  peaks_ = watch.peaks();
   for (std::size_t k = 0; k < sides_.size(); ++k)
     result.psi(sides_[k].row) += sides_[k].part.factor * peaks_[k].front().value;
   return true;
@@ -182,15 +179,14 @@ bool ExtremeRun::find(const Mechanism& mechanism) {
 bool ExtremeRun::differentiate(const Mechanism& mechanism, bool backward, const std::vector<int>& variables) {
   RunOptions on_steps = options_;
   if (!is_cvodes(settings_.integrator.type)) on_steps.frozen = &result.steps;
-  std::vector<Cost> tops;  // each peak at its instant and at its top
+  std::vector<Cost> tops;
   for (std::size_t k = 0; k < sides_.size(); ++k) {
     const std::shared_ptr<const PointCost> x = sides_[k].objective->expression(mechanism);
-    for (const Peak& peak : peaks_[k])
-      for (const double t : {peak.t, peak.top}) {
-        Cost& cost = tops.emplace_back();
-        cost.name = sides_[k].objective->name();
-        cost.samples.push_back({t, x});
-      }
+    for (const Peak& peak : peaks_[k]) {
+      Cost& cost = tops.emplace_back();
+      cost.name = sides_[k].objective->name();
+      cost.samples.push_back({peak.t, x});
+    }
   }
   VectorXd values;  // of the tops
   MatrixXd values_rho;

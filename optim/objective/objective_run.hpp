@@ -45,8 +45,8 @@ struct ExtremePiece {
   double t = 0;              // [s]; of two, a sum that tells pairs apart
 };
 
-// One evaluation with true extremes. A run finds the steps and the other objectives, a look at its dense output the
-// peaks (peaks.hpp). Derivatives are those of a sweep on the same steps, in which each peak is a sample at its instant.
+// One evaluation with true extremes. A run finds the steps, the other objectives and the peaks (peaks.hpp). Derivatives
+// are those of a sweep on the same steps, in which each peak is a sample at its instant.
 //
 //   ExtremeRun run(objectives, settings, options);
 //   if (run.find(mechanism_without_derivatives)) run.differentiate(mechanism, false, variables);
@@ -75,10 +75,8 @@ class ExtremeRun {
   std::vector<std::vector<Peak>> peaks_;
 };
 
-// The true extreme of each objective that is one, on given steps. It evaluates the dense output at eight points of each
-// step, at the times of the rows of a trajectory, and at higher tops of parabolas through three of them. If the motion
-// is solved, it halves the brackets of these tops until rtol. So the motion reaches the value. There is none if
-// progress, called after steps as in RunOptions, stops the search.
+// The true extreme of each objective that is one, on given steps (peaks.hpp). There is none if progress, called after
+// steps as in RunOptions, stops the search.
 std::vector<std::optional<double>> true_extremes(const std::vector<Objective>& objectives, const Mechanism& mechanism,
                                                  const SimulationSettings& settings, const StepSequence& steps,
                                                  const std::function<bool(double t)>& progress = {});

@@ -1,127 +1,136 @@
 #include "optim/objective/peaks.hpp"
 
 #include <algorithm>
+#include <boost/math/tools/minima.hpp>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "core/cvodes/cvodes.hpp"
 #include "core/run/output_times.hpp"
 #include "core/simulate/simulation.hpp"
 
 namespace mbsopt::inline optim {
-namespace {
 
-// The values of side * x that were seen, in the order of time.
-class SeenValues {
- public:
-  void add(double t, double x) {
-    if (std::isfinite(x)) points_.push_back({t, x});
+PeakWatch::PeakWatch(std::vector<Watched> watched, const SimulationSettings& settings)
+    : rows_(output_times(settings)), max_step_(settings.integrator.max_step.value_or(INFINITY)) {
+  for (Watched& of : watched) curves_.push_back({std::move(of), {}, {}, {}});
+}
+
+Sampling PeakWatch::sampling() {
+  for (Curve& curve : curves_) curve = {curve.of, {}, {}, {}};
+  next_row_ = 0;
+  return {{}, {}, [this](const StepInside& step) { look(step); }};
+}
+
+std::vector<std::vector<Peak>> PeakWatch::peaks() const {
+  std::vector<std::vector<Peak>> found;
+  for (Curve curve : curves_) {
+    if (curve.rose || curve.best.empty()) curve.add(curve.last);
+    for (Peak& peak : curve.best) peak.value *= curve.of.side;
+    found.push_back(std::move(curve.best));
   }
+  return found;
+}
 
-  // A point that no neighbour exceeds, with the top of the parabola through the three.
-  struct Top {
-    double t, x;  // of the parabola
-    double t0, t1, t2, x1;
-    double bound;  // a peak that three values do not resolve may rise to it
+void PeakWatch::Curve::add(const Peak& peak) {
+  best.insert(std::ranges::upper_bound(best, peak.value, std::greater(), &Peak::value), peak);
+  if (best.size() > kMostPeaks) best.pop_back();
+}
+
+void PeakWatch::look(const StepInside& step) {
+  set_times(step);
+  for (Curve& curve : curves_) curve.points.clear();
+  for (const double t : times_) {
+    const StatePoint at = step.state_at(t);
+    for (Curve& curve : curves_)
+      if (const double value = curve.value(at); std::isfinite(value)) curve.points.push_back({t, value});
+  }
+  for (Curve& curve : curves_) find_tops(curve, step);
+}
+
+// No row of a trajectory exceeds a true extreme.
+void PeakWatch::set_times(const StepInside& step) {
+  constexpr double kParts = 8;
+  constexpr double kSame = 1e-6;  // of the step: values so near to each other differ by rounding only
+  const double h = step.t1 - step.t0;
+  times_.assign(step.solved.begin(), step.solved.end());
+  if (static_cast<double>(step.solved.size()) <= kParts) {
+    const double parts = std::max(kParts, std::ceil(h / max_step_));
+    times_.clear();
+    for (double j = 0; j < parts; ++j) times_.push_back(step.t0 + j * h / parts);
+    times_.push_back(step.t1);
+  }
+  for (; next_row_ < rows_.size() && rows_[next_row_] <= step.t1; ++next_row_)
+    if (rows_[next_row_] > step.t0) times_.push_back(rows_[next_row_]);
+  std::ranges::sort(times_);
+  const auto same = [&](double a, double b) { return b - a <= kSame * h; };
+  times_.erase(std::unique(times_.begin(), times_.end(), same), times_.end());
+}
+
+void PeakWatch::find_tops(Curve& curve, const StepInside& step) {
+  constexpr double kBeside = 1e-4;  // of the distance to the next point: where the value shows whether it rises
+  const std::vector<Peak>& p = curve.points;
+  if (p.empty()) return;
+  const auto beside = [&](const Peak& end, const Peak& next) {
+    const double t = end.t + kBeside * (next.t - end.t);
+    return Peak{t, curve.value(step.state_at(t))};
   };
-  // The highest ones first. The ends of the run are tops if the value falls from there.
-  std::vector<Top> tops() {
-    std::ranges::stable_sort(points_, {}, &Point::t);
-    const auto same = [](const Point& a, const Point& b) { return a.t == b.t; };
-    points_.erase(std::unique(points_.begin(), points_.end(), same), points_.end());
-    if (points_.empty()) return {{0, kLow, 0, 0, 0, kLow, kLow}};
-    std::vector<Top> found;
-    const std::size_t last = points_.size() - 1;
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-      const auto [t1, x1] = points_[i];
-      const double before = i > 0 ? points_[i - 1].x : kLow, after = i < last ? points_[i + 1].x : kLow;
-      if (x1 < before || x1 < after || (x1 == before && x1 == after)) continue;
-      if (i == 0 || i == last) {
-        found.push_back({t1, x1, t1, t1, t1, x1, x1});
-        continue;
-      }
-      found.push_back(parabola(points_[i - 1], points_[i], points_[i + 1]));
-    }
-    if (const auto [t, x] = points_[0]; found.empty()) found.push_back({t, x, t, t, t, x, x});  // it is constant
-    std::ranges::stable_sort(found, std::greater(), &Top::x);
-    return found;
+  curve.last = p.back();
+  if (p.size() == 1) return;
+  if (p[0].value >= p[1].value) {
+    if (const Peak inside = beside(p[0], p[1]); inside.value > p[0].value)
+      refine(curve, p[0], inside, p[1], step);
+    else if (curve.rose)
+      curve.add(p[0]);
   }
+  for (std::size_t i = 1; i + 1 < p.size(); ++i) {
+    const double before = p[i - 1].value, here = p[i].value, after = p[i + 1].value;
+    if (here >= before && here >= after && !(here == before && here == after))
+      refine(curve, p[i - 1], p[i], p[i + 1], step);
+  }
+  const Peak& left = p[p.size() - 2];
+  curve.rose = curve.last.value > left.value;
+  if (!curve.rose) return;
+  const Peak inside = beside(curve.last, left);
+  if (!(inside.value > curve.last.value)) return;
+  curve.rose = false;
+  refine(curve, left, inside, curve.last, step);
+}
 
- private:
-  static constexpr double kLow = -std::numeric_limits<double>::infinity();
-  static constexpr double kRise = 4;  // times the rise to the middle value
-  struct Point {
-    double t, x;
+// The parabola x = x1 + b s + c s^2, s = t - t1, through three points tells how high the top may be. Points of a solved
+// run may not resolve a narrow peak, which rises higher.
+void PeakWatch::refine(Curve& curve, const Peak& left, const Peak& top, const Peak& right, const StepInside& step) {
+  constexpr double kRise = 4;  // times the rise to the middle point
+  constexpr int kBits = 18;    // of the bracket: the value at a smooth top is then exact to rounding
+  const double s0 = left.t - top.t, s2 = right.t - top.t;
+  const double d0 = (left.value - top.value) / s0, d2 = (right.value - top.value) / s2;
+  const double c = (d2 - d0) / (s2 - s0), b = d0 - c * s0;
+  double highest = c < 0 ? top.value - b * b / (4 * c) : top.value;
+  if (!step.solved.empty())
+    highest = std::max(highest, top.value + kRise * (top.value - std::min(left.value, right.value)));
+  if (curve.best.size() == kMostPeaks && !(highest > curve.best.back().value)) return;
+  const double middle = (left.t + right.t) / 2, half = (right.t - left.t) / 2;
+  const auto instant = [&](double s) { return std::clamp(middle + s * half, left.t, right.t); };
+  const auto depth = [&](double s) {
+    const double value = curve.value(step.state_at(instant(s)));
+    return std::isfinite(value) ? -value : std::numeric_limits<double>::max();
   };
-
-  // x = x1 + b s + c s^2,  s = t - t1
-  static Top parabola(const Point& p0, const Point& p1, const Point& p2) {
-    const double s0 = p0.t - p1.t, s2 = p2.t - p1.t;
-    const double d0 = (p0.x - p1.x) / s0, d2 = (p2.x - p1.x) / s2;
-    const double c = (d2 - d0) / (s2 - s0), b = d0 - c * s0;
-    const double bound = p1.x + kRise * (p1.x - std::min(p0.x, p2.x));
-    const double top = c < 0 ? std::clamp(-b / (2 * c), s0, s2) : 0;
-    return {p1.t + top, p1.x + b * top + c * top * top, p0.t, p1.t, p2.t, p1.x, bound};
-  }
-
-  std::vector<Point> points_;
-};
-
-}  // namespace
+  std::uintmax_t most = 60;  // Brent's method converges before
+  const auto [s, lowest] = boost::math::tools::brent_find_minima(depth, -1.0, 1.0, kBits, most);
+  curve.add(-lowest >= top.value ? Peak{instant(s), -lowest} : top);
+}
 
 std::vector<std::vector<Peak>> peaks(const std::vector<Watched>& watched, const Mechanism& mechanism,
                                      const SimulationSettings& settings, const StepSequence& steps,
                                      const std::function<bool(double t)>& progress) {
-  // Integrated runs have dense output that their steps resolve: one look beside the tops gives their times to 1e-6 of a
-  // step. Solved ones may have narrow peaks: their brackets are halved as often as a hundredth of the run needs for
-  // 1e-4 of itself.
-  constexpr int kLooks = 2, kHalvings = 14;
-  constexpr double kBeside = 0.1;  // of the distance to the neighbours
   if (watched.empty()) return {};
-  std::vector<SeenValues> curves(watched.size());
-  Sampling sampling;
-  sampling.times = output_times(settings);  // no row of a trajectory exceeds a true extreme
-  for (std::size_t i = 0; i < steps.times.size(); ++i) {
-    const double points = std::max(8.0, std::ceil(steps.sizes[i] / settings.integrator.max_step.value_or(INFINITY)));
-    for (double j = 0; j < points; ++j) sampling.times.push_back(steps.times[i] + j * steps.sizes[i] / points);
-  }
-  sampling.observe = [&](std::size_t, const StatePoint& at) {
-    for (std::size_t k = 0; k < watched.size(); ++k) curves[k].add(at.t, watched[k].side * watched[k].x->value(at));
-  };
+  PeakWatch watch(watched, settings);
   // CVODES takes its own steps again.
   const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, progress};
-  std::vector<std::vector<SeenValues::Top>> tops(watched.size());
-  for (int look = 0;; ++look) {
-    std::ranges::sort(sampling.times);
-    sampling.times.erase(std::unique(sampling.times.begin(), sampling.times.end()), sampling.times.end());
-    const SimulationResult run = simulate(mechanism, settings, {}, sampling, options);
-    if (!run.ok()) return {};
-    sampling.times.clear();
-    const bool solved = run.statistics.solved;
-    for (std::size_t k = 0; k < watched.size(); ++k) {
-      tops[k] = curves[k].tops();
-      const double largest = std::ranges::max(tops[k], {}, &SeenValues::Top::x1).x1, rtol = settings.integrator.rtol;
-      for (std::size_t j = 0; j < tops[k].size(); ++j) {
-        const SeenValues::Top& top = tops[k][j];
-        if (top.t0 == top.t2) continue;  // an end of the run
-        if (look + 1 < kLooks && j < kMostPeaks) {
-          const double beside = kBeside * std::min(top.t1 - top.t0, top.t2 - top.t1);
-          for (const double t : {std::max(top.t - beside, top.t0), top.t, std::min(top.t + beside, top.t2)})
-            sampling.times.push_back(t);
-        }
-        if (solved && look < kHalvings && std::max(top.x, top.bound) > largest + rtol * std::abs(largest))
-          for (const double t : {(top.t0 + top.t1) / 2, (top.t1 + top.t2) / 2, top.t}) sampling.times.push_back(t);
-      }
-    }
-    if (sampling.times.empty()) break;
-  }
-  std::vector<std::vector<Peak>> found(watched.size());
-  for (std::size_t k = 0; k < watched.size(); ++k) {
-    tops[k].resize(std::min(tops[k].size(), kMostPeaks));
-    for (const SeenValues::Top& top : tops[k]) found[k].push_back({top.t1, watched[k].side * top.x1, top.t});
-    std::ranges::stable_sort(found[k], std::greater(), [&](const Peak& p) { return watched[k].side * p.value; });
-  }
-  return found;
+  if (!simulate(mechanism, settings, {}, watch.sampling(), options).ok()) return {};
+  return watch.peaks();
 }
 
 }  // namespace mbsopt::inline optim

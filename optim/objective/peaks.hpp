@@ -1,10 +1,12 @@
-// The largest or least values of expressions over a run, with the local ones beside them, on given steps.
+// The largest or least values of expressions over a run, with the local ones beside them.
 //
-// The dense output is evaluated at eight points of each step and at the times of the rows of a trajectory, and then
-// near the tops of parabolas through three of them. If the motion is solved, it halves the brackets of tops until rtol.
+// A watch looks into each step: at eight instants of an integrated one, at the nodes of a solved one, and at the times
+// of the rows of a trajectory. Where three neighbours enclose a top, Brent's method finds it ("Algorithms for
+// Minimization without Derivatives", 1973, chapter 5), unless it cannot be one of the most extreme.
 //
-//   const auto found = peaks({{1, force}}, mechanism, settings, run.steps);
-//   found[0].front().value        // the largest force
+//   PeakWatch watch({{1, force}}, settings);
+//   simulate(mechanism, settings, costs, watch.sampling());
+//   watch.peaks()[0].front().value        // the largest force
 #pragma once
 
 #include <functional>
@@ -23,15 +25,44 @@ struct Watched {
 };
 
 struct Peak {
-  double t = 0, value = 0;  // the motion reaches the value
-  double top = 0;           // time of the top of the parabola through this and its neighbours
+  double t = 0, value = 0;
 };
 
 // At most this many of one expression: those of the most extreme values.
 inline constexpr std::size_t kMostPeaks = 8;
 
-// Per expression at least one peak, the most extreme one first. Nothing if the run fails, or if progress, called after
-// steps as in RunOptions, stops it.
+class PeakWatch {
+ public:
+  PeakWatch(std::vector<Watched> watched, const SimulationSettings& settings);
+
+  // Of the run to watch, which begins anew. The watch outlives it.
+  Sampling sampling();
+  // After the run: per expression at least one peak, the most extreme one first.
+  std::vector<std::vector<Peak>> peaks() const;
+
+ private:
+  struct Curve {
+    Watched of;
+    std::vector<Peak> points;  // finite values of side * x in the present step
+    std::vector<Peak> best;    // of side * x, the highest first
+    Peak last;                 // point so far
+    bool rose = true;          // to it: it is a top if the value falls from there
+    double value(const StatePoint& at) const { return of.side * of.x->value(at); }
+    void add(const Peak& peak);
+  };
+  void look(const StepInside& step);
+  void set_times(const StepInside& step);
+  static void find_tops(Curve& curve, const StepInside& step);
+  static void refine(Curve& curve, const Peak& left, const Peak& top, const Peak& right, const StepInside& step);
+
+  std::vector<Curve> curves_;
+  const std::vector<double> rows_;  // the times of the rows of a trajectory
+  const double max_step_;
+  std::size_t next_row_ = 0;
+  std::vector<double> times_;  // in the present step
+};
+
+// The same of a run on given steps. Nothing if it fails, or if progress, called after steps as in RunOptions, stops it.
 std::vector<std::vector<Peak>> peaks(const std::vector<Watched>& watched, const Mechanism& mechanism,
                                      const SimulationSettings& settings, const StepSequence& steps,
                                      const std::function<bool(double t)>& progress = {});

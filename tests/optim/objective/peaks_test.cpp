@@ -4,7 +4,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "core/simulate/simulation.hpp"
 #include "optim/objective/evaluator.hpp"
+#include "optim/objective/expression_cost.hpp"
+#include "optim/problem/parameter_values.hpp"
 #include "tests/core/mechanism/one_coordinate.hpp"
 
 using namespace mbsopt;
@@ -78,6 +81,27 @@ TEST_CASE("gradients of true extremes are the differences of free runs", "[peaks
     for (const Eigen::Index i : {0, 1, 2, 3})
       CHECK((plus.psi(i) - minus.psi(i)) / (2 * h(k)) == Approx(e.psi_rho(i, k)).epsilon(1e-5).margin(1e-6));
   }
+}
+
+// x = a cos(w t) passes x0 at full speed; x^2 has its highest peaks at both turns, of equal height, and one at the end.
+TEST_CASE("peaks at kinks, at the ends of a run, and of every method are found within the run", "[peaks]") {
+  const std::string method = GENERATE("dopri5", "dopri853", "cvodes_adams", "radau5");
+  Scene s = swinging_mass({{"a", 0.2}, {"k", 4}}, "-k*x", 3.2, 1e-10);
+  s.simulation.integrator.type = method;
+  s.simulation.integrator.max_step.reset();
+  CAPTURE(method);
+  const Mechanism mechanism(s, parameter_values(s));
+  const auto of = [&](const char* x) { return CostExpression(f(x), s).bind(mechanism); };
+  PeakWatch watch({{-1, of("abs(x - 0.07)")}, {1, of("x^2")}, {1, of("t")}, {1, of("3")}}, s.simulation);
+  REQUIRE(simulate(mechanism, s.simulation, {}, watch.sampling()).ok());
+  const std::vector<std::vector<Peak>> found = watch.peaks();
+  CHECK(std::abs(found[0].front().value) < 1e-6);  // 1e-5 of a bracket of a step
+  CHECK(found[0].front().t == Approx(std::acos(0.07 / 0.2) / 2).epsilon(1e-5));
+  REQUIRE(found[1].size() == 3);  // t = 0, pi/2, pi
+  for (const Peak& peak : found[1]) CHECK(peak.value == Approx(0.04).epsilon(1e-8));
+  CHECK(found[2].size() == 1);
+  CHECK(found[2].front().value == 3.2);
+  CHECK(found[3].front().value == 3);
 }
 
 TEST_CASE("other objectives do not change beside true extremes", "[peaks]") {
