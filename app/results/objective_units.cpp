@@ -79,7 +79,7 @@ Known dimension_of(const ObjectiveSpec& spec, const Dimensions& dimensions) {
 
 std::string unit_of(const ObjectiveSpec& spec, const Dimensions& dimensions) {
   if (spec.is_written_in_cpp()) return "";
-  if (spec.eigenvalue) return spec.eigenvalue->value == "frequency" ? "Hz" : "-";
+  if (spec.eigenvalue) return spec.eigenvalue->value.ends_with("frequency") ? "Hz" : "-";
   if (spec.frequency_response && spec.frequency_response->value == "phase") return "rad";
   if (spec.frequency_response) return "";
   try {

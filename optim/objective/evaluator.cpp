@@ -388,7 +388,7 @@ bool Evaluator::add_parameters_only(Evaluation& e) const {
       e.psi(i) += peaks.front().value;
       e.psi_rho.row(i) += peaks.front().gradient.transpose();
       for (const FrequencyResponse::Peak& peak : peaks)
-        if (peaks.size() > 1) e.pieces.push_back({i, 1, peak.value, peak.gradient, peak.frequency});
+        if (peaks.size() > 1) e.pieces.push_back({i, objective.side(), peak.value, peak.gradient, peak.frequency});
       for (const std::string& doubt : doubts)
         e.warnings.push_back(fmt::format("objective '{}': {}", objective.name(), doubt));
     }

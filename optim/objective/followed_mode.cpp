@@ -75,28 +75,45 @@ FollowedMode::FollowedMode(const Scene& scene, const EigenvalueSpec& spec)
 FollowedMode::~FollowedMode() = default;
 
 Index FollowedMode::mode_of(const State& state, const UserForces& forces) const {
+  const int number = spec_.mode.value_or(1);
   std::call_once(reference_->once, [&] {
     reference_->shapes = State(scene_, parameter_values(scene_), forces, false).shapes();
-    if (reference_->shapes.cols() < spec_.mode)
+    if (reference_->shapes.cols() < number)
       throw std::runtime_error(
-          fmt::format("there is no mode {}: the initial state has {}", spec_.mode, reference_->shapes.cols()));
+          fmt::format("there is no mode {}: the initial state has {}", number, reference_->shapes.cols()));
   });
   const std::vector<Index> modes = state.modes();
   const MatrixXd alike = (reference_->shapes.adjoint() * state.shapes()).cwiseAbs2();
-  const Index found = one_to_one(alike)[static_cast<std::size_t>(spec_.mode - 1)];
+  const Index found = one_to_one(alike)[static_cast<std::size_t>(number - 1)];
   if (found < 0)
-    throw std::runtime_error(fmt::format("mode {} does not exist here: there are {} modes in place of {}", spec_.mode,
+    throw std::runtime_error(fmt::format("mode {} does not exist here: there are {} modes in place of {}", number,
                                          modes.size(), reference_->shapes.cols()));
   return modes[static_cast<std::size_t>(found)];
 }
 
 double FollowedMode::value_of(std::complex<double> lambda) const {
-  return spec_.value == "frequency" ? frequency(lambda) : damping_ratio(lambda);
+  return spec_.value.ends_with("frequency") ? frequency(lambda) : damping_ratio(lambda);
+}
+
+std::vector<Index> FollowedMode::modes_of(const State& state, const UserForces& forces) const {
+  constexpr std::size_t kMost = 8;  // a step of a design does not lower more modes to the least one
+  if (!is_least()) return {mode_of(state, forces)};
+  std::vector<Index> modes = state.modes();
+  if (modes.empty()) throw std::runtime_error("the initial state has no modes");
+  std::ranges::stable_sort(modes, {}, [&](Index k) { return value_of(state.x.eigenvalues(k)); });
+  modes.resize(std::min(modes.size(), kMost));
+  return modes;
 }
 
 double FollowedMode::value(const VectorXd& rho, const UserForces& forces) const {
   const State state(scene_, rho, forces, false);
-  return value_of(state.x.eigenvalues(mode_of(state, forces)));
+  return value_of(state.x.eigenvalues(modes_of(state, forces).front()));
+}
+
+int FollowedMode::number(const VectorXd& rho, const UserForces& forces) const {
+  const State state(scene_, rho, forces, false);
+  const std::vector<Index> modes = state.modes();
+  return static_cast<int>(std::ranges::find(modes, mode_of(state, forces)) - modes.begin()) + 1;
 }
 
 namespace {
@@ -119,20 +136,26 @@ MatrixXd state_matrix(SpatialDynamics& dynamics) {
 
 }  // namespace
 
-double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces, Eigen::Ref<VectorXd> rho_bar,
-                                  std::vector<std::string>* warnings) const {
+std::vector<FollowedMode::Slope> FollowedMode::slopes(const VectorXd& rho, const UserForces& forces,
+                                                      std::vector<std::string>* warnings) const {
   State state(scene_, rho, forces, true);
-  const Index mode = mode_of(state, forces);
+  const std::vector<Index> modes = modes_of(state, forces);
+  const std::complex<double> lambda = state.x.eigenvalues(modes.front());
+  for (Index k = 0; warnings && k < state.x.eigenvalues.size(); ++k) {
+    constexpr double kSame = 1e-6;  // relative: closer ones turn into each other within a usual step of a design
+    if (k != modes.front() && std::abs(state.x.eigenvalues(k) - lambda) <= kSame * std::abs(lambda))
+      warnings->push_back("another mode has the same eigenvalue: neither has a derivative there");
+  }
+  std::vector<Slope> slopes;
+  for (const Index mode : modes) slopes.push_back(slope(state, mode));
+  return slopes;
+}
+
+FollowedMode::Slope FollowedMode::slope(State& state, Index mode) const {
   const std::complex<double> lambda = state.x.eigenvalues(mode);
   const double size = std::abs(lambda);
   if (size <= state.x.errors(mode))
     throw std::runtime_error("the mode is a free motion, whose eigenvalue 0 has no derivative");
-  for (Index k = 0; warnings && k < state.x.eigenvalues.size(); ++k) {
-    constexpr double kSame = 1e-6;  // relative: closer ones turn into each other within a usual step of a design
-    if (k != mode && std::abs(state.x.eigenvalues(k) - lambda) <= kSame * size)
-      warnings->push_back("another mode has the same eigenvalue: neither has a derivative there");
-  }
-
   SpatialDynamics dynamics(state.mechanism, state.formulation);
   const MechanismData& d = dynamics.data();
   const VectorXd units = state.units(size);
@@ -150,7 +173,7 @@ double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces,
   const VectorXcd w_in_y = w.conjugate().cwiseQuotient(units), v_in_y = v.cwiseProduct(units);
 
   // Columns: the cotangents Re w, Im w; rows: (y, rho).
-  const Index states = units.size(), P = rho.size();
+  const Index states = units.size(), P = d.rho.size();
   const auto adjoints = [&](const VectorXd& y) -> std::optional<VectorXd> {
     if (!linearise_at(y)) return std::nullopt;
     VectorXd out = VectorXd::Zero(2 * (states + P)), theta(d.slots()), of_rho(P);
@@ -185,12 +208,8 @@ double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces,
 
   // d|lambda| = Re(conj(lambda) dlambda)/|lambda|
   const VectorXd size_rho = (lambda.real() * lambda_rho.col(0) + lambda.imag() * lambda_rho.col(1)) / size;
-  if (spec_.value == "frequency") {
-    rho_bar += size_rho / (2 * std::numbers::pi);
-  } else {
-    rho_bar += -lambda_rho.col(0) / size + (lambda.real() / (size * size)) * size_rho;
-  }
-  return value_of(lambda);
+  if (spec_.value.ends_with("frequency")) return {value_of(lambda), size_rho / (2 * std::numbers::pi)};
+  return {value_of(lambda), -lambda_rho.col(0) / size + (lambda.real() / (size * size)) * size_rho};
 }
 
 }  // namespace mbsopt::inline optim

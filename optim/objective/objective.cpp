@@ -220,8 +220,12 @@ std::vector<FrequencyResponse::Peak> Objective::parameters_only_gradients(const 
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(rho.size());
   double value = 0;
   if (mode_) {
-    value = named(name_, [&] { return mode_->add_gradient(rho, forces, gradient, warnings); });
-  } else if (parameters_only_) {
+    std::vector<FrequencyResponse::Peak> pieces;
+    for (const FollowedMode::Slope& slope : named(name_, [&] { return mode_->slopes(rho, forces, warnings); }))
+      pieces.push_back({slope.value, slope.value, slope.gradient(variables)});
+    return pieces;
+  }
+  if (parameters_only_) {
     Program::Scratch scratch = parameters_only_->scratch();
     value = parameters_only_->add_gradient(numbers_of(rho), 1, numbers_of(gradient), scratch);
   }

@@ -92,12 +92,14 @@ class Objective {
   bool is_linear() const;
 
   // The part that depends on the parameters alone; it includes an eigenvalue and a response. With its gradient in these
-  // variables, the largest amplitude of a response is the first of its peaks. Errors are std::runtime_error.
+  // variables, the largest amplitude of a response is the first of its peaks, the least frequency of all modes the
+  // first of them; side() is that of such pieces. Errors are std::runtime_error.
   double parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces = {}) const;
   std::vector<FrequencyResponse::Peak> parameters_only_gradients(const Eigen::VectorXd& rho,
                                                                  const FollowedMode::UserForces& forces,
                                                                  const std::vector<int>& variables,
                                                                  std::vector<std::string>* warnings = nullptr) const;
+  int side() const { return mode_ ? -1 : 1; }
   void add_parameters_only_hessian(const Eigen::VectorXd& rho, const std::vector<int>& variables,
                                    Eigen::MatrixXd& H) const;
 

@@ -148,6 +148,11 @@ void check_meaning(Checker& checker, const SignalSamples& samples) {
                                       (names.empty() ? "; there are no signals" : "; signals: " + joined(names)));
 }
 
+void check_meaning(Checker& checker, const EigenvalueSpec& eigenvalue) {
+  if (eigenvalue.mode && eigenvalue.value.starts_with("least"))
+    report(checker, "mode", "is given, but {} is the least of all modes", eigenvalue.value);
+}
+
 void check_meaning(Checker& checker, const FrequencyResponseSpec& response) {
   const bool at_one = response.value == "amplitude" || response.value == "phase";
   if (at_one && (!response.at || response.from || response.to))

@@ -23,8 +23,8 @@ struct ObjectiveSample {
 
 // An eigenvalue of one mode of the motion near the initial state, an equilibrium (docs/linearisation.md).
 struct EigenvalueSpec {
-  int mode = 1;                     // from slow to fast, at the values of the file
-  std::string value = "frequency";  // [Hz], or "damping": its ratio
+  std::optional<int> mode;          // from slow to fast, at the values of the file; the first
+  std::string value = "frequency";  // [Hz], or "damping": its ratio; "least_" before it: the least of all modes
 };
 
 // The response to an input that swings, near the initial state (frequency_response.hpp).

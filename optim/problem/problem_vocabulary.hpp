@@ -49,8 +49,9 @@ void describe(auto& v, Like<TrackTerm> auto& t) {
 
 void describe(auto& v, Like<EigenvalueSpec> auto& e) {
   v.plain("mode", e.mode, kPositive,
-          {"number of the mode, from slow to fast at the values of the file, as in `mbsopt linearise`"});
-  v.word("value", e.value, Words{"frequency damping"}, {"natural frequency [Hz], or damping ratio"});
+          {"number of the mode, from slow to fast at the values of the file, as in `mbsopt linearise`; 1"});
+  v.word("value", e.value, Words{"frequency damping least_frequency least_damping"},
+         {"natural frequency [Hz], or damping ratio, of the mode, or the least of all modes"});
 }
 
 void describe(auto& v, Like<FrequencyResponseSpec> auto& r) {

@@ -29,11 +29,7 @@ Scene hanging_pendulum() {
   return s;
 }
 
-VectorXd gradient(const FollowedMode& mode, const VectorXd& rho) {
-  VectorXd out = VectorXd::Zero(rho.size());
-  mode.add_gradient(rho, {}, out);
-  return out;
-}
+VectorXd gradient(const FollowedMode& mode, const VectorXd& rho) { return mode.slopes(rho, {}).front().gradient; }
 
 }  // namespace
 
@@ -77,7 +73,8 @@ TEST_CASE("objectives of two modes never follow the same one", "[followed_mode]"
   Rsda torsion;
   torsion.joint = "elbow", torsion.stiffness = f("k2");
   scene.forces.push_back({"torsion2", torsion});
-  const FollowedMode first(scene, {1, "frequency"}), second(scene, {2, "frequency"});
+  const FollowedMode first(scene, {1, "frequency"}), second(scene, {2, "frequency"}),
+      least(scene, {{}, "least_frequency"});
   VectorXd rho = nominal(scene);
   rho(1) = 0;
   for (const double k2 : {0.01, 1.0, 30.0, 300.0, 1e4}) {
@@ -88,7 +85,13 @@ TEST_CASE("objectives of two modes never follow the same one", "[followed_mode]"
       const double det_M = (J + both) * J - both * both / 4, det_K = (k + k2 + 3 * w) * (k2 + w) - k2 * k2;
       const double turns = std::pow(2 * std::numbers::pi, 2);
       CAPTURE(k, k2);
-      CHECK(first.value(rho, {}) * second.value(rho, {}) * turns == Approx(std::sqrt(det_K / det_M)).epsilon(1e-6));
+      const double f1 = first.value(rho, {}), f2 = second.value(rho, {});
+      CHECK(f1 * f2 * turns == Approx(std::sqrt(det_K / det_M)).epsilon(1e-6));
+      CHECK(least.value(rho, {}) == std::min(f1, f2));
+      const std::vector<FollowedMode::Slope> slopes = least.slopes(rho, {});
+      REQUIRE(slopes.size() == 2);
+      CHECK(slopes[1].value == Approx(std::max(f1, f2)).epsilon(1e-12));
+      CHECK((slopes[0].gradient - gradient(f1 < f2 ? first : second, rho)).norm() == 0);
     }
   }
 }
