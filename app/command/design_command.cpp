@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <stdexcept>
 #include <utility>
 
 #include "app/report/run_page.hpp"
@@ -16,6 +18,7 @@
 #include "core/expression/counted.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
+#include "optim/objective/followed_mode.hpp"
 
 namespace mbsopt::inline app {
 namespace {
@@ -209,6 +212,26 @@ Trajectory history_of(const DesignResult& design) {
   return history;
 }
 
+// Modes are numbered at the values of a file. Returns the new numbers of those that have another one at these values.
+std::map<std::string, int> renumbered_modes(Run& run, const Eigen::VectorXd& rho) {
+  std::map<std::string, int> modes;
+  for (const ObjectiveSpec& spec : run.problem.objectives) {
+    if (!spec.eigenvalue || spec.eigenvalue->value.starts_with("least")) continue;
+    const int before = spec.eigenvalue->mode.value_or(1);
+    try {
+      const int after = FollowedMode(run.problem.scene, *spec.eigenvalue).number(rho, {});
+      if (after == before) continue;
+      modes[spec.name] = after;
+      run.warn(
+          fmt::format("objective '{}': mode {} of this file is number {} from slow to fast at the solution, as in "
+                      "optimized.json. To limit whichever mode is lowest, take least_frequency or least_damping",
+                      spec.name, before, after));
+    } catch (const std::runtime_error&) {  // the result says that there is no such mode
+    }
+  }
+  return modes;
+}
+
 void add_motions(RunPage& page, const Scene& designed, const SimulatedMotion& before, const SimulatedMotion& after) {
   const Scene& scene = page.run.problem.scene;
   const std::vector<PointTarget> targets = prescribed_points(page.run.problem, after.instants);
@@ -294,7 +317,8 @@ int design_command(const CommandContext& context) {
   std::vector<NewValue> values;
   for (const DesignVariable& v : design.variables) values.push_back({"", v.name, v.value});
   run.write("optimized.json",
-            optimized_problem_text(run, values, design.mode ? design.mode->bodies : std::vector<Body>{}));
+            optimized_problem_text(run, values, design.mode ? design.mode->bodies : std::vector<Body>{},
+                                   renumbered_modes(run, design.rho)));
   run.write("history.csv", to_csv(history));
   if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory, after.simulation.statistics.singular);
   add_convergence(page, history, unit_of(run.result["objectives"][design.objective]));

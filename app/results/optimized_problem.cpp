@@ -102,8 +102,8 @@ Json formulation_json(const FormulationSettings& f) {
 
 }  // namespace
 
-std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values,
-                                   const std::vector<Body>& poses) {
+std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values, const std::vector<Body>& poses,
+                                   const std::map<std::string, int>& modes) {
   const Problem& problem = run.problem;
   std::string text = read_text_file(run.context.options.problem_file);
   for (const std::string& set : run.context.options.sets) text = with_override(text, set);
@@ -133,6 +133,8 @@ std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& 
     text = with_value(text, body + ".position", json_text(json_of(poses[i].position)));
     text = with_value(text, body + ".orientation", json_text(json_of(poses[i].orientation)));
   }
+  for (const auto& [objective, number] : modes)
+    text = with_value(text, fmt::format("objectives.{}.eigenvalue.mode", objective), std::to_string(number));
   return text;
 }
 

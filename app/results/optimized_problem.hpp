@@ -2,6 +2,7 @@
 // in another folder: the paths of data files are rewritten. Comments and formatting stay.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,9 +18,10 @@ struct NewValue {
 
 class Run;
 
-// poses are those of the scene's bodies, if they must be written, too.
+// poses are those of the scene's bodies, modes the numbers of modes of eigenvalue objectives, if they must be written,
+// too.
 std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values,
-                                   const std::vector<Body>& poses = {});
+                                   const std::vector<Body>& poses = {}, const std::map<std::string, int>& modes = {});
 
 // recommended.json: the problem of the run with other integrator and formulation settings. Comments and formatting
 // stay, except inside simulation.integrator and .formulation.

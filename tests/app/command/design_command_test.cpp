@@ -98,6 +98,97 @@ TEST_CASE("design: optimized.json is a problem whose objective is the optimum's"
   CHECK(again == Approx(found).epsilon(1e-12));
 }
 
+namespace {
+
+// Two masses, of 1 and 2 kg, each on a spring of its own along x.
+constexpr const char* kTwoMasses = R"({
+  "gravity": [0, 0, 0],
+  "parameters": {"k1": {"value": 100, "lower": 50, "upper": 400}, "k2": {"value": 400, "lower": 50, "upper": 900}},
+  "bodies": [{"name": "a", "mass": 1, "inertia": [1, 1, 1], "position": [1, 0, 0]},
+             {"name": "b", "mass": 2, "inertia": [1, 1, 1], "position": [1, 1, 0]}],
+  "joints": [{"name": "A", "type": "translational", "body2": "a", "axis1": [1, 0, 0], "axis2": [1, 0, 0]},
+             {"name": "B", "type": "translational", "body2": "b", "point1": [0, 1, 0], "axis1": [1, 0, 0],
+              "axis2": [1, 0, 0]}],
+  "forces": [{"name": "s1", "type": "tsda", "body2": "a", "stiffness": "k1", "free_length": 1},
+             {"name": "s2", "type": "tsda", "body2": "b", "point1": [0, 1, 0], "stiffness": "k2", "free_length": 1}],
+  "simulation": {"end_time": 1},
+  "objectives": {"first": {"eigenvalue": {"mode": 1}}, "all": {"eigenvalue": {"value": "least_frequency"}},
+                 "cost": {"parameters_only": "k1 + k2"}},
+  "design": {"maximize": "first", "variables": ["k1"]}
+})";
+
+}  // namespace
+
+TEST_CASE("design: modes have their numbers at the values of optimized.json", "[command]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome = run_design_command(folder.write("masses.json", kTwoMasses), folder.file("out"), {});
+  CHECK(outcome.exit_code == kDone);  // k1 = 400: the first mode passes the second, sqrt(400/2)
+  CHECK_THAT(outcome.err, Contains("'first': mode 1 of this file is number 2 from slow to fast at the solution"));
+  const double found = json_of(folder.path / "out/result.json").at("optimizer").at("objective_final");
+  CHECK(found == Approx(20 / (2 * 3.14159265358979)).epsilon(1e-9));
+  REQUIRE(run_command({"simulate", folder.file("out/optimized.json"), "--out", folder.file("again")}).exit_code ==
+          kDone);
+  CHECK(json_of(folder.path / "again/result.json").at("objectives").at("first").at("value").get<double>() ==
+        Approx(found).epsilon(1e-9));
+}
+
+TEST_CASE("design: the least of all frequencies is highest where they meet", "[command]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome =
+      run_design_command(folder.write("masses.json", kTwoMasses), folder.file("out"),
+                         {"--set", "design.maximize=all", "--set", R"(design.variables=["k1", "k2"])", "--set",
+                          R"(design.subject_to=[{"objective": "cost", "upper": 600}])"});
+  INFO(outcome.out << outcome.err);
+  CHECK(outcome.exit_code == kDone);
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("optimizer").at("status") == "converged");
+  CHECK(result.at("parameters").at("k1").at("value").get<double>() == Approx(200).epsilon(1e-5));
+  CHECK(result.at("optimizer").at("objective_final").get<double>() ==
+        Approx(std::sqrt(200) / (2 * 3.14159265358979)).epsilon(1e-6));
+}
+
+// Hoeken's straight-line linkage, from a start with a variable of 0. Its best line of four cranks is 7.2985e-4 m high
+// by SLSQP in a closed model of the linkage.
+TEST_CASE("design: a variable that is 0 at the start moves as others do", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("line.json", R"({
+    "gravity": [0, 0, 0],
+    "parameters": {
+      "d": {"value": 0.3, "lower": 0.15, "upper": 1.5}, "b": {"value": 0.375, "lower": 0.15, "upper": 1.5},
+      "c": {"value": 0.375, "lower": 0.15, "upper": 1.5}, "e": {"value": 0.75, "lower": 0, "upper": 3},
+      "f": {"value": 0, "lower": -0.75, "upper": 0.75}},
+    "definitions": {"a": 0.15},
+    "bodies": [
+      {"name": "crank", "mass": 1, "inertia": [1, 1, 1], "orientation": {"axis": [0, 0, 1], "angle": "pi/2"},
+       "points": {"end": ["a", 0, 0]}},
+      {"name": "coupler", "mass": 1, "inertia": [1, 1, 1], "position": [0, "a", 0],
+       "orientation": {"axis": [0, 0, 1], "angle": "30 [deg]"}, "points": {"end": ["b", 0, 0], "P": ["e", "f", 0]}},
+      {"name": "rocker", "mass": 1, "inertia": [1, 1, 1], "position": ["d", 0, 0],
+       "orientation": {"axis": [0, 0, 1], "angle": "pi/2"}, "points": {"end": ["c", 0, 0]}}],
+    "joints": [
+      {"name": "A", "type": "revolute", "body2": "crank", "axis1": [0, 0, 1], "axis2": [0, 0, 1]},
+      {"name": "B", "type": "revolute", "body1": "crank", "body2": "coupler", "point1": "end", "axis1": [0, 0, 1],
+       "axis2": [0, 0, 1]},
+      {"name": "C", "type": "revolute", "body1": "coupler", "body2": "rocker", "point1": "end", "point2": "end",
+       "axis1": [0, 0, 1], "axis2": [0, 0, 1]},
+      {"name": "D", "type": "revolute", "body2": "rocker", "point1": ["d", 0, 0], "axis1": [0, 0, 1],
+       "axis2": [0, 0, 1]}],
+    "drives": [{"name": "motor", "type": "angle", "joint": "A", "law": "pi/2 + pi*t"}],
+    "sensors": {"x": {"quantity": "position", "body": "coupler", "point": "P", "component": "x"},
+                "y": {"quantity": "position", "body": "coupler", "point": "P", "component": "y"}},
+    "simulation": {"end_time": 1},
+    "objectives": {"band": {"peak_to_peak_of": "y"}},
+    "design": {"minimize": "band", "variables": ["d", "b", "c", "e", "f"],
+               "subject_to": [{"peak_to_peak_of": "x", "lower": 0.6, "upper": 0.6}]}
+  })");
+  const CommandOutcome outcome = run_design_command(file, folder.file("out"), {});
+  INFO(outcome.out << outcome.err);
+  CHECK(outcome.exit_code == kDone);
+  const auto optimizer = json_of(folder.path / "out/result.json").at("optimizer");
+  CHECK(optimizer.at("status") == "converged");
+  CHECK(optimizer.at("objective_final").get<double>() == Approx(7.29853e-4).epsilon(1e-4));
+}
+
 TEST_CASE("design: a bound that holds the optimum back is named", "[command]") {
   const TemporaryFolder folder;
   const CommandOutcome outcome =
