@@ -312,6 +312,10 @@ int design_command(const CommandContext& context) {
   } else if (!design.ok()) {
     long_run.failed(design.status, design.message);
   }
+  if (design.final_evaluation.ok && !after.simulation.ok() && after.simulation.status != SimulationStatus::stopped &&
+      !interrupted())
+    run.warn(fmt::format("the motion of this design ends at t = {:.6g} s, after all that its objectives read: {}",
+                         after.simulation.last_good_time, after.simulation.message));
   add_instants(run, after);
   const Trajectory history = history_of(design);
   std::vector<NewValue> values;
