@@ -206,6 +206,17 @@ TEST_CASE("a variable must matter to what the design uses, or to what is measure
   CHECK(find_idle_variables(problem)[0].path == "identification.experiments[0].free[0]");
 }
 
+TEST_CASE("a parameter that every load case replaces is in use, but no variable", "[unused]") {
+  Problem problem = two_pendulums();
+  problem.scene.parameters[1].allow_unused = true;
+  add_objective(problem, "ya^2");
+  problem.cases = {{"light", 1, {{"ma", Expression(0.5)}}}, {"heavy", 1, {{"ma", Expression(2.0)}}}};
+  CHECK(unused(problem) == Paths{});
+  problem.design.emplace();
+  problem.design->minimize = "psi0", problem.design->variables = {"ma"};
+  CHECK(find_idle_variables(problem).size() == 1);
+}
+
 TEST_CASE("gravity and initial conditions count", "[unused]") {
   Problem problem = two_pendulums();
   problem.scene.parameters.push_back({"g", 9.81});
