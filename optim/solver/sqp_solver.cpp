@@ -282,10 +282,10 @@ class SqpSearch : private NlpSearch {
     const VectorXd bend = bend_of_lagrangian(there, step, model), s = x() - x_;  // x(): of the last evaluation
     const double ratio = gained / gain;
     if (ratio < kPoor) radius_ = kShorter * d.norm();
-    if (ratio > kGood) radius_ = std::max(radius_, kLonger * d.norm());
-    x_ = (x_ + d).cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
-    point_ = there;
-    problem_.moved_to(x_);
+    // The violation of limits that bend is no reason for shorter steps: a second step corrects it.
+    const double bent = std::max(0.0, nu_ * (scaled_violation(problem_, there) - model.violation(d)));
+    if (gained + bent > kGood * gain) radius_ = std::max(radius_, kLonger * d.norm());
+    move_to((x_ + d).cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper), there);
     read_hessian();
     learn(s, bend);
     uses_given_ = prefers_given_ || !is_usable(learnt_);

@@ -147,6 +147,20 @@ TEST_CASE("sqp finds the least of a largest", "[sqp]") {
   }
 }
 
+// Along a helix within two limits that bend: x0 = cos(4 x2), x1 = sin(4 x2).
+TEST_CASE("sqp follows limits that bend in long steps", "[sqp]") {
+  Written problem(3, {[](const auto& x) { return 1e-3 * sq(x(2) - 2); }},
+                  {[](const auto& x) { return x(0) - std::cos(4 * x(2)); },
+                   [](const auto& x) { return x(1) - std::sin(4 * x(2)); }});
+  problem.c_lower.setZero();
+  problem.c_upper.setZero();
+  problem.f_scale = 250;
+  const NlpResult result = solve_with_sqp(problem, vector({1, 0, 0}));
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(result.x(2) == Approx(2).epsilon(1e-5));
+  CHECK(result.evaluations < 60);
+}
+
 TEST_CASE("sqp says that limits exclude each other, at the point that violates them least", "[sqp]") {
   Written problem(2, {[](const auto& x) { return x(1); }},
                   {[](const auto& x) { return x.squaredNorm(); }, [](const auto& x) { return x(0); }});
