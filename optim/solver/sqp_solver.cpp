@@ -46,8 +46,7 @@ class SqpSearch : private NlpSearch {
     result_.x = x_start;
     point_ = at(x_start, Wanted::derivatives);
     if (!point_.ok) return point_.abandoned ? result_.end_on_request() : end_refused();
-    x_ = x();
-    problem_.moved_to(x_);
+    move_to(x(), point_);
     begin();
     if (shown(look(point_))) return;
     while (true) {
@@ -67,15 +66,27 @@ class SqpSearch : private NlpSearch {
     result_.end_at_limit(most, of);
   }
 
-  // The last point, where a search that continues the motion in another way may go on.
+  // The best point that the search has moved to: others may belong to another motion.
   void end_at_jump() {
-    result_.x = x_;
-    result_.point = point_;
-    result_.end(
-        SolverStatus::no_progress,
-        "no further progress: the objective or a limit jumps beside this point: an assembly mode ends there, or "
-        "a law has a step" +
-            result_.failures());
+    result_.x = best_moved_x_;
+    result_.point = best_moved_;
+    result_.end(SolverStatus::no_progress,
+                "no further progress: the objective or a limit jumps beside the last point: an assembly mode ends "
+                "there, a law has a step, or modes of eigenvalues change their numbers" +
+                    result_.failures());
+  }
+
+  void move_to(const VectorXd& x, const NlpPoint& point) {
+    x_ = x;
+    point_ = point;
+    problem_.moved_to(x_);
+    const auto violations = [&](const NlpPoint& p) {
+      return problem_.sum_of_violations(p.c, options_.constraint_tolerance);
+    };
+    if (best_moved_x_.size() > 0 && !is_better(point.f, violations(point), best_moved_.f, violations(best_moved_)))
+      return;
+    best_moved_x_ = x;
+    best_moved_ = point;
   }
 
   void begin() {
@@ -361,8 +372,8 @@ class SqpSearch : private NlpSearch {
   }
 
   const SqpOptions& options_;
-  VectorXd x_;
-  NlpPoint point_;
+  VectorXd x_, best_moved_x_;
+  NlpPoint point_, best_moved_;
   std::vector<double> fallen_;  // f, point by point, since the optimality conditions hold
   double unbalanced_ = 0;       // optimality of the point, feasible or not
   double missed_ = 0;           // by the promise of the last step
