@@ -152,7 +152,8 @@ std::vector<Parameter> DesignProgram::designed() const {
 
 // Per variable the change d that alters an objective or a limit by its size:
 //   |g| d + |h| d^2/2 = |psi|      g: slope at the start, h: its change along a short step of all these variables
-// Empty if all values tell how large their variables are. Where h is not known, values tell that unless they are 0.
+// Empty if all values tell how large their variables are. Where h is not known, values tell that unless they are 0. Of
+// an extreme h is taken as 0: another peak may become the largest on the way.
 VectorXd DesignProgram::felt_changes() {
   constexpr double kShort = 1e-3, kShortOfRange = 1e-8;  // of the value; of a range, which may be far too wide
   const std::vector<Parameter> variables = designed();
@@ -160,12 +161,21 @@ VectorXd DesignProgram::felt_changes() {
   if (std::ranges::none_of(variables, is_scaled_by_range)) return {};
   const Evaluation start = evaluator_.gradients(evaluator_.start());
   if (!start.ok) return {};
+  const auto alters = [&](Index i, Index k, double h) {
+    const double size = std::abs(start.psi(i)), g = std::abs(start.psi_rho(i, k));
+    return size > 0 && g + h > 0 ? 2 * size / (g + std::sqrt(g * g + 2 * h * size)) : kInfinity;
+  };
   VectorXd beside = evaluator_.start();
   for (std::size_t k = 0; k < variables.size(); ++k) {
     const Parameter& p = variables[k];
     if (!is_scaled_by_range(p)) continue;
-    const double of_range = p.lower && p.upper ? kShortOfRange * (*p.upper - *p.lower) : kShort;
-    const double step = p.value != 0 ? kShort * std::abs(p.value) : of_range;
+    double least = kInfinity;
+    for (Index i = 0; i < start.psi.size(); ++i) least = std::min(least, alters(i, static_cast<Index>(k), 0));
+    const double range = p.lower && p.upper ? *p.upper - *p.lower : kInfinity;
+    const double of_range = std::isfinite(range) ? kShortOfRange * range : kShort;
+    const double step = p.value != 0           ? kShort * std::abs(p.value)
+                        : std::isfinite(least) ? std::max(of_range, kShort * std::min(least, range))
+                                               : of_range;
     beside(indices[k]) += p.upper && p.value + step > *p.upper ? -step : step;
   }
   const Evaluation there = evaluator_.gradients(beside);
@@ -175,9 +185,11 @@ VectorXd DesignProgram::felt_changes() {
     const double step = beside(index) - start.rho(index);
     felt(k) = there.ok || start.rho(index) == 0 ? kInfinity : 0;
     for (Index i = 0; i < start.psi.size(); ++i) {
-      const double size = std::abs(start.psi(i)), g = std::abs(start.psi_rho(i, k));
-      const double h = there.ok && step != 0 ? std::abs((there.psi_rho(i, k) - start.psi_rho(i, k)) / step) : 0;
-      if (size > 0 && g + h > 0) felt(k) = std::min(felt(k), 2 * size / (g + std::sqrt(g * g + 2 * h * size)));
+      const Objective& objective =
+          evaluator_.of_case(0).objectives()[static_cast<std::size_t>(i) % evaluator_.of_case(0).objectives().size()];
+      const bool is_bent = there.ok && step != 0 && !objective.is_extreme();
+      felt(k) =
+          std::min(felt(k), alters(i, k, is_bent ? std::abs((there.psi_rho(i, k) - start.psi_rho(i, k)) / step) : 0));
     }
   }
   return felt;
