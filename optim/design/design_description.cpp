@@ -52,9 +52,9 @@ void describe_conflict(const DesignProgram& program, const Eigen::VectorXd& x, c
     const DesignConstraint& c = result.constraints[i];
     const double z = found.of_constraints(static_cast<Eigen::Index>(i));
     if (std::abs(z) <= kNoPrice) continue;
+    const double size = program.size(static_cast<Eigen::Index>(i)), missed = std::max(c.violation, c.true_violation);
     result.conflicts.push_back({limit_text(c.in_words(), z > 0, z > 0 ? *c.upper : *c.lower),
-                                std::max(c.violation, c.true_violation),
-                                std::abs(z) / program.size(static_cast<Eigen::Index>(i))});
+                                missed > kConstraintTolerance * size ? missed : 0, std::abs(z) / size});
   }
   const Eigen::VectorXd rho_x = program.scaling().rho_x(x);
   for (std::size_t k = 0; k < result.variables.size(); ++k) {

@@ -131,8 +131,9 @@ void NlpSearch::end_refused() {
 }
 
 void NlpSearch::conclude(const std::string& why) {
+  constexpr double kHeldAtLast = 1e-6;  // of a limit's size: where limits leave no room, steps may come no nearer
   take_solution();
-  if (!feasible(result_.point))
+  if (problem_.violation(result_.point.c) > std::max(constraint_tolerance_, kHeldAtLast))
     return result_.end(SolverStatus::infeasible,
                        "infeasible: no point near the last one satisfies the constraints; relax them or start "
                        "elsewhere" +
@@ -145,11 +146,9 @@ void NlpSearch::conclude(const std::string& why) {
     return result_.end(SolverStatus::converged,
                        "converged: the objective does not change any more, and the optimality conditions hold to the "
                        "accuracy of its derivatives");
-  result_.end(
-      SolverStatus::no_progress,
-      fmt::format("no further progress: {}, but the optimality conditions hold to {:.1e} only, not to {:g}; try "
-                  "tighter simulation tolerances, or a larger optimiser tolerance{}",
-                  why, distance, tolerance_, result_.failures()));
+  result_.end(SolverStatus::no_progress,
+              fmt::format("no further progress: {}, but the optimality conditions hold to {:.1e} only, not to {:g}{}",
+                          why, distance, tolerance_, result_.failures()));
 }
 
 }  // namespace mbsopt::inline optim
