@@ -173,7 +173,18 @@ class SingleDesign {
     if (abandoned_ && !options_.evaluate_stopped) return;
     is_describing_ = true;
     describe_solution(program_, solution_.x, result_);
-    if (!abandoned_) judge_solution(program_, result_);
+    if (abandoned_) return;
+    judge_solution(program_, result_);
+    if (result_.status == SolverStatus::no_progress) add_advice();
+  }
+
+  void add_advice() {
+    if (!result_.final_evaluation.statistics.solved)
+      result_.message += "; try tighter simulation tolerances, or a larger optimiser tolerance";
+    else if (result_.failed_evaluations > 0)
+      result_.message +=
+          "; beside this design the linkage comes to a dead point: a limit on smallest_singular_value or on a "
+          "transmission angle keeps it away";
   }
 
   void add_warnings() {
@@ -214,10 +225,10 @@ Problem away_from_dead_points(Problem problem, const std::vector<double>& instan
     if (t > end) continue;
     ObjectiveSpec& distance = problem.objectives.emplace_back();
     distance.name = fmt::format("{} at {:.17g} s", sensor.name, t);
-    distance.samples.push_back({t, Expression::parse(sensor.name)});
+    distance.samples.push_back({t, Expression::parse(sensor.name + "^2")});  // near a dead point linear in lengths
     ObjectiveBound& limit = problem.design->subject_to.emplace_back();
     limit.objective = distance.name;
-    limit.lower = kDistance;
+    limit.lower = kDistance * kDistance;
   }
   return problem;
 }
@@ -242,6 +253,7 @@ class Searches {
     const OptimizerSpec& spec = first.optimizer();
     if (spec.type == "sqp" || !best_.final_evaluation.ok) return ended();
     options_.compare_differences = false;
+    options_.scale.reset();  // that of the first start
     doubts_ = first.doubts();
     const NloptMethod* const method = find_nlopt_method(spec.type);
     const bool is_global = method && method->global;
@@ -276,31 +288,28 @@ class Searches {
   }
 
   void go_on_with_ipopt() {
-    if (std::optional<SingleDesign> search = prepared(problem_, "ipopt", options_))
+    if (std::optional<SingleDesign> search = prepared(problem_, "ipopt"))
       if (take(*search, "from the start, as it may find another valley") && search->smooths()) go_on_with_sqp();
   }
   void go_on_with_sqp() {
-    if (std::optional<SingleDesign> search = prepared(continued(best_), "sqp", options_))
-      take(*search, "from that end");
+    if (std::optional<SingleDesign> search = prepared(continued(best_), "sqp")) take(*search, "from that end");
   }
   void go_on_in_poses() {
     constexpr int kMost = 5;
     for (int k = 0; k < kMost && best_.status == SolverStatus::no_progress; ++k) {
-      std::optional<SingleDesign> search = prepared(continued(best_), OptimizerSpec::kLeastSquares, options_);
+      std::optional<SingleDesign> search = prepared(continued(best_), OptimizerSpec::kLeastSquares);
       if (!search || !take(*search, "from that end, in its poses")) return;
     }
   }
   void go_round_dead_points(const std::vector<double>& instants) {
-    DesignOptions without_scale = options_;  // which has no place for the distances
-    without_scale.scale.reset();
-    std::optional<SingleDesign> search = prepared(away_from_dead_points(problem_, instants), "sqp", without_scale);
+    std::optional<SingleDesign> search = prepared(away_from_dead_points(problem_, instants), "sqp");
     if (!search) return;
     const DesignResult guarded = search->run();
     note(*search, "from the start, with a distance from dead points", guarded);
     best_.add_counts(guarded);
     if (guarded.status == SolverStatus::stopped) return best_.end(guarded.status, guarded.message);
     if (!guarded.final_evaluation.ok) return;
-    if (std::optional<SingleDesign> last = prepared(continued(guarded), "sqp", options_))
+    if (std::optional<SingleDesign> last = prepared(continued(guarded), "sqp"))
       take(*last, "from that end, without the distance");
   }
 
@@ -320,7 +329,7 @@ class Searches {
   }
 
   // None if the searches before have spent all that the optimiser may spend.
-  std::optional<SingleDesign> prepared(Problem problem, const char* type, const DesignOptions& options) {
+  std::optional<SingleDesign> prepared(Problem problem, const char* type) {
     const OptimizerSpec& given = problem_.design->optimizer;
     OptimizerSpec& spec = problem.design->optimizer;
     spec = {};
@@ -331,7 +340,7 @@ class Searches {
     if (best_.status == SolverStatus::stopped || spec.max_iterations.value_or(1) <= 0 ||
         spec.max_evaluations.value_or(1) <= 0)
       return {};
-    return std::optional<SingleDesign>(std::in_place, problem, options);
+    return std::optional<SingleDesign>(std::in_place, problem, options_);
   }
 
   // Runs a search and keeps the better end. Returns whether that is its own.
