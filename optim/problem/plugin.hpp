@@ -19,7 +19,7 @@ namespace mbsopt::inline optim {
 // The layout of passed objects depends on the classes of this version, the compiler's ABI, and the alignment of Eigen's
 // vectors. -march changes the last one.
 inline constexpr const char* kPluginInterface =
-    "mbsopt 0.1, ABI " MBSOPT_TEXT(__GXX_ABI_VERSION) ", Eigen " MBSOPT_TEXT(EIGEN_WORLD_VERSION) "." MBSOPT_TEXT(
+    "mbsopt 0.2, ABI " MBSOPT_TEXT(__GXX_ABI_VERSION) ", Eigen " MBSOPT_TEXT(EIGEN_WORLD_VERSION) "." MBSOPT_TEXT(
         EIGEN_MAJOR_VERSION) "." MBSOPT_TEXT(EIGEN_MINOR_VERSION) " aligned to " MBSOPT_TEXT(EIGEN_MAX_ALIGN_BYTES);
 
 }  // namespace mbsopt::inline optim
