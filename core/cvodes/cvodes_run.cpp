@@ -264,7 +264,8 @@ double ForwardRun::stop_before_pulse(double t, PulseWatch& pulses) {
     return scaled_norm(y_change_, y_now_, y_now_, tolerances_);
   };
   const double given = h;
-  while (h > shortest && pulses.worst(t, h, true, change).error > PulseWatch::kMissed) h /= 2;
+  while (h > shortest && pulses.worst(t, h, true, y_now_, flow_.angles_at(t), change).error > PulseWatch::kMissed)
+    h /= 2;
   return h < given ? t + h : end;
 }
 
@@ -310,7 +311,7 @@ void ForwardRun::go(std::span<const double> observed, Follower& follower) {
                                                                 result_.statistics.jumps)});
   observers.push_back(&samples);
   // CVODES sees the rates at the ends of a step.
-  PulseWatch pulses(mechanism_, costs_, t, end, settings_.integrator.rtol, {{0, 0.5, 0.5}, {1, 0.5, -0.5}});
+  PulseWatch pulses(mechanism_, settings_, costs_, {{0, 0.5, 0.5}, {1, 0.5, -0.5}});
   std::string words = objection_to_start(observers, {t, y_now_, assembly_.result().angles});
   if (!words.empty()) result_.stop(SimulationStatus::not_credible, std::move(words));
   while (t < end && result_.ok()) {

@@ -52,7 +52,7 @@ RungeKuttaRun::RungeKuttaRun(StepAttempt& attempt, std::span<const Cost> costs, 
       stiffness_(attempt.method(), mechanism_.states(), result.statistics) {
   if (adaptive_ && attempt.responses() > 0) passage_.emplace(attempt.method(), attempt.responses());
   if (frozen_) return;
-  pulses_.emplace(mechanism_, costs, settings_.start_time, end_, integrator_.rtol, pulse_nodes(attempt.method()));
+  pulses_.emplace(mechanism_, settings_, costs, pulse_nodes(attempt.method()));
   kink_control_ = KinkControl(with_jumps(kinks_of(mechanism_, costs), pulses_->jumps()), settings_.start_time, end_);
 }
 
@@ -191,9 +191,10 @@ StepOutcome RungeKuttaRun::try_step() {
 // Returns whether to try shorter steps, since this one misses a pulse; its error is that of the pulse.
 bool RungeKuttaRun::passes_over_pulse() {
   const double least = std::max(PulseWatch::kShortest * span_, integrator_.options.min_step.value_or(0));
-  Pulse worst = pulses_->worst(step_.t, h_, adaptive_, [&](double at, double beside, double duration) {
+  const auto change = [&](double at, double beside, double duration) {
     return attempt_.change_by(at, beside, duration);
-  });
+  };
+  Pulse worst = pulses_->worst(step_.t, h_, adaptive_, step_.y0, step_.angles0, change);
   if (adaptive_ && h_ > least) {
     if (worst.error > PulseWatch::kMissed) error_ = worst.error;
     return worst.error > PulseWatch::kMissed;

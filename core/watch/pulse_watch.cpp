@@ -34,13 +34,18 @@ std::vector<QuadratureNode> pulse_nodes(const Method& method) {
   return nodes;
 }
 
-PulseWatch::PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end, double rtol,
+PulseWatch::PulseWatch(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                        std::vector<QuadratureNode> nodes)
-    : rtol_(rtol), nodes_(std::move(nodes)), inputs_(timed_inputs(mechanism)) {
+    : rtol_(settings.integrator.rtol),
+      span_(settings.end_time - settings.start_time),
+      costs_(costs),
+      nodes_(std::move(nodes)),
+      inputs_(timed_inputs(mechanism)) {
+  if (mechanism.data().needs_motion) motion_.emplace(mechanism, settings.formulation);
   const std::vector<KinkedSignal>& signals = mechanism.data().kinks;
   for (std::size_t k = 0; k < signals.size(); ++k)
     functions_.push_back({{.signal = static_cast<int>(k)}, {}, signals[k].curve, signals[k].delay, {}});
-  for (TimedLaw& law : timed_laws(mechanism, costs, start, end)) {
+  for (TimedLaw& law : timed_laws(mechanism, costs, settings.start_time, settings.end_time)) {
     law.part.grow(scratch_);
     functions_.push_back({{.force = law.force, .drive = law.drive}, std::move(law), nullptr, 0, {}});
   }
@@ -135,12 +140,29 @@ PulseWatch::Candidate PulseWatch::candidate(Function& f, double t, double h, boo
   return {at, beside, missed / change, is_cost ? missed / f.of_size : 0};
 }
 
-Pulse PulseWatch::worst(double t, double h, bool noticed, const Change& change) {
+// The largest error of a running cost [tolerances], if it is a thousandth of the integral or more: smaller ones would
+// let a rough record, which is a row of pulses, ask for steps as short as its samples.
+double PulseWatch::missed_by_costs(const Candidate& pulse, double t, const Eigen::VectorXd& y,
+                                   const Eigen::VectorXd& angles) {
+  constexpr double kLeast = 1e-3;
+  double worst = 0;
+  for (const Cost& cost : costs_) {
+    if (!motion_ || !cost.running || cost.is_extreme) continue;
+    const auto g = [&](double time) { return cost.running->value({time, y, angles, &*motion_}); };
+    const double missed = std::abs(g(pulse.at) - g(pulse.beside)) * pulse.duration;
+    worst = std::max(worst, missed / (std::abs(g(t)) * span_ + missed));
+  }
+  return worst > kLeast ? worst / rtol_ : 0;
+}
+
+Pulse PulseWatch::worst(double t, double h, bool noticed, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                        const Change& change) {
   Pulse worst;
   for (Function& f : functions_) {
     const Candidate d = candidate(f, t, h, noticed);
     if (!(d.duration > 0)) continue;
-    const double error = d.share > 0 ? d.share / rtol_ : change(d.at, d.beside, d.duration);
+    const double error =
+        d.share > 0 ? d.share / rtol_ : std::max(change(d.at, d.beside, d.duration), missed_by_costs(d, t, y, angles));
     if (!(error > worst.error)) continue;
     worst = f.pulse;
     worst.t = d.at;

@@ -9,20 +9,24 @@
 // than half as much at t'. The accelerations a at both instants, in one state, give what the velocities miss:
 //   D (a(t*) - a(t'))/(f(t*) - f(t'))
 // So a rough record costs nothing where nodes notice it, and a pulse below the tolerances costs two evaluations. A
-// running cost misses D itself.
+// running cost of time misses D itself. One that reads reactions or accelerations may see a force that moves nothing:
+// it misses  D (g(t*) - g(t'))/(f(t*) - f(t')).
 //
-//   PulseWatch watch(mechanism, costs, start, end, rtol, pulse_nodes(method));
-//   if (watch.worst(t, h, true, change).error > PulseWatch::kMissed) // try a shorter step
+//   PulseWatch watch(mechanism, settings, costs, pulse_nodes(method));
+//   if (watch.worst(t, h, true, y, angles, change).error > PulseWatch::kMissed) // try a shorter step
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "core/dynamics/motion_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/run/simulation_result.hpp"
 #include "core/run/timed_laws.hpp"
+#include "core/scene/settings.hpp"
 #include "core/watch/quadrature_watch.hpp"
 
 namespace mbsopt {
@@ -32,7 +36,8 @@ std::vector<QuadratureNode> pulse_nodes(const Method& method);
 
 class PulseWatch {
  public:
-  PulseWatch(const Mechanism& mechanism, std::span<const Cost> costs, double start, double end, double rtol,
+  // The costs outlive it.
+  PulseWatch(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
              std::vector<QuadratureNode> nodes);
 
   // The instants at which laws and running costs jump.
@@ -43,9 +48,10 @@ class PulseWatch {
   static constexpr double kMissed = 10, kShortest = 1e-10;
   // The change of velocity [tolerances] if the accelerations at t* and t' differ for a duration [s].
   using Change = std::function<double(double at, double beside, double duration)>;
-  // The pulse that the step misses most, with its error in tolerances; 0: none. Steps begin later than, or where, those
-  // before began. noticed: what nodes notice is rejected elsewhere.
-  Pulse worst(double t, double h, bool noticed, const Change& change);
+  // The pulse that the step from (t, y) misses most, with its error in tolerances; 0: none. Steps begin later than, or
+  // where, those before began. noticed: what nodes notice is rejected elsewhere.
+  Pulse worst(double t, double h, bool noticed, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+              const Change& change);
 
  private:
   struct Integrals {
@@ -74,8 +80,11 @@ class PulseWatch {
     double share = 0;           // D of the integral of |f| over the run: of a running cost, else 0
   };
   Candidate candidate(Function& f, double t, double h, bool noticed);
+  double missed_by_costs(const Candidate& pulse, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
 
-  const double rtol_;
+  const double rtol_, span_;
+  const std::span<const Cost> costs_;
+  std::optional<MotionSolver> motion_;  // where a sensor needs it
   const std::vector<QuadratureNode> nodes_;
   std::vector<Function> functions_;
   std::vector<double> inputs_;

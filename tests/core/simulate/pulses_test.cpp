@@ -89,6 +89,34 @@ TEST_CASE("pulses of laws are resolved wherever they lie", "[pulses]") {
   CHECK(r.v_adjoint == Approx(impulse).epsilon(1e-4));
 }
 
+// A blow on the point of a ball joint moves nothing, but the joint bears it.
+TEST_CASE("a blow that only a reaction shows is seen where a cost reads that", "[pulses]") {
+  const std::string method = GENERATE(as<std::string>{}, "dopri853", "dopri5", "radau5", "cvodes_bdf");
+  CAPTURE(method);
+  Scene scene = cart("30*max(0, 1 - abs(t - 3.1373)/2e-4)/2e-4", 10, method);
+  scene.joints[0].type = "spherical";
+  scene.bodies[0].angular_velocity = {0.3, 0.0, 0.0};
+  Sensor reaction;
+  reaction.name = "R", reaction.quantity = "reaction", reaction.joint = "slide", reaction.kind = "force";
+  reaction.component = "x";
+  scene.sensors.push_back(reaction);
+  const Mechanism mechanism(scene, nominal(scene));
+  struct Borne final : PointCost {
+    explicit Borne(const Mechanism& m) : mechanism(m) {}
+    double value(const StatePoint& at) const override { return mechanism.sensor_value(0, at); }
+    double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+      return mechanism.add_sensor_gradient(0, at, scale, y_bar, rho_bar);
+    }
+    Mechanism mechanism;
+  };
+  const std::vector<Cost> costs{{std::make_shared<Borne>(mechanism), nullptr, {}, "borne"}};
+  const SimulationResult result = simulate(mechanism, scene.simulation, costs, {}, {});
+  REQUIRE(result.ok());
+  // Runge-Kutta methods say how far they resolve it, CVODES does.
+  CHECK(std::abs(std::abs(result.psi(0)) - 30) < 30 * std::max(1e-4, result.statistics.quadrature.error));
+  CHECK(simulation_warnings(scene, scene.simulation, result.statistics, true).empty() == (method == "cvodes_bdf"));
+}
+
 // A blow back at once after a blow leaves no speed, but a way.
 TEST_CASE("double pulses that cancel in the speed are resolved", "[pulses]") {
   const std::string method = GENERATE(as<std::string>{}, "dopri853", "dopri5", "radau5", "rodas4");
