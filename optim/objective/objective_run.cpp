@@ -61,14 +61,16 @@ bool in_range(const std::vector<ObjectiveMean>& means, const VectorXd& values) {
 
 // Makes extremes softer whose exponentials the steps do not resolve, unless the file gives their sharpness. Of large
 // values the default is far too much. Returns whether there is one.
-bool soften(std::vector<ObjectiveMean>& means, const VectorXd& values) {
+bool soften(std::vector<ObjectiveMean>& means, const SimulationResult& run) {
+  constexpr double kUnresolved = 0.3;  // of an exponential's integral: beyond it, there is a warning
+  const bool unresolved = run.statistics.extreme_quadrature.error > kUnresolved;
   bool found = false;
   for (std::size_t k = 0; k < means.size(); ++k) {
     auto& [objective, row, part, x0] = means[k];
     const double size = std::abs(objective->exponent(part) * x0);
     if (part.side == 0 || objective->is_written_in_cpp() || objective->spec().sharpness) continue;
-    if (std::isfinite(objective->of_integral(values(static_cast<Index>(k)), part, x0).value)) continue;
-    if (!(size > ObjectiveSpec::kSharpness)) continue;
+    const double value = objective->of_integral(run.psi(static_cast<Index>(k)), part, x0).value;
+    if ((std::isfinite(value) && !unresolved) || !(size > ObjectiveSpec::kSharpness)) continue;
     part.softness = ObjectiveSpec::kSharpness / size;
     found = true;
   }
@@ -124,7 +126,7 @@ SimulationResult run_objectives(const std::vector<Objective>& objectives, const 
   if (complete && !in_range(means, result.psi)) {
     set_x0(means, mechanism, settings, result.steps, progress);
     result = sweep(costs());
-    if (result.ok() && soften(means, result.psi)) result = sweep(costs());
+    if (result.ok() && soften(means, result)) result = sweep(costs());
   }
   if (!result.ok()) return result;
   const VectorXd I = result.psi;
