@@ -215,6 +215,7 @@ Trajectory history_of(const DesignResult& design) {
 // Modes are numbered at the values of a file. Returns the new numbers of those that have another one at these values.
 std::map<std::string, int> renumbered_modes(Run& run, const Eigen::VectorXd& rho) {
   std::map<std::string, int> modes;
+  std::string changes;
   for (const ObjectiveSpec& spec : run.problem.objectives) {
     if (!spec.eigenvalue || spec.eigenvalue->value.starts_with("least")) continue;
     const int before = spec.eigenvalue->mode.value_or(1);
@@ -222,13 +223,15 @@ std::map<std::string, int> renumbered_modes(Run& run, const Eigen::VectorXd& rho
       const int after = FollowedMode(run.problem.scene, *spec.eigenvalue).number(rho, {});
       if (after == before) continue;
       modes[spec.name] = after;
-      run.warn(
-          fmt::format("objective '{}': mode {} of this file is number {} from slow to fast at the solution, as in "
-                      "optimized.json. To limit whichever mode is lowest, take least_frequency or least_damping",
-                      spec.name, before, after));
+      changes += fmt::format("{}that of '{}' from {} to {}", changes.empty() ? "" : ", ", spec.name, before, after);
     } catch (const std::runtime_error&) {  // the result says that there is no such mode
     }
   }
+  if (!modes.empty())
+    run.warn(
+        fmt::format("modes change their numbers from slow to fast at the solution, also in optimized.json: {}. To "
+                    "limit whichever mode is lowest, take least_frequency or least_damping",
+                    changes));
   return modes;
 }
 

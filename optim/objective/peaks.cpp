@@ -15,11 +15,11 @@ namespace mbsopt::inline optim {
 
 PeakWatch::PeakWatch(std::vector<Watched> watched, const SimulationSettings& settings)
     : rows_(output_times(settings)), max_step_(settings.integrator.max_step.value_or(INFINITY)) {
-  for (Watched& of : watched) curves_.push_back({std::move(of), {}, {}, {}});
+  for (Watched& of : watched) curves_.push_back({std::move(of)});
 }
 
 Sampling PeakWatch::sampling() {
-  for (Curve& curve : curves_) curve = {curve.of, {}, {}, {}};
+  for (Curve& curve : curves_) curve = {curve.of};
   next_row_ = 0;
   return {{}, {}, [this](const StepInside& step) { look(step); }};
 }

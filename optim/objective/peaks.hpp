@@ -9,6 +9,7 @@
 //   watch.peaks()[0].front().value        // the largest force
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -43,10 +44,10 @@ class PeakWatch {
  private:
   struct Curve {
     Watched of;
-    std::vector<Peak> points;  // finite values of side * x in the present step
-    std::vector<Peak> best;    // of side * x, the highest first
-    Peak last;                 // point so far
-    bool rose = true;          // to it: it is a top if the value falls from there
+    std::vector<Peak> points = {};  // finite values of side * x in the present step
+    std::vector<Peak> best = {};    // of side * x, the highest first
+    Peak last{0, -INFINITY};        // point so far; none was finite
+    bool rose = true;               // to it: it is a top if the value falls from there
     double value(const StatePoint& at) const { return of.side * of.x->value(at); }
     void add(const Peak& peak);
   };

@@ -92,7 +92,8 @@ TEST_CASE("peaks at kinks, at the ends of a run, and of every method are found w
   CAPTURE(method);
   const Mechanism mechanism(s, parameter_values(s));
   const auto of = [&](const char* x) { return CostExpression(f(x), s).bind(mechanism); };
-  PeakWatch watch({{-1, of("abs(x - 0.07)")}, {1, of("x^2")}, {1, of("t")}, {1, of("3")}}, s.simulation);
+  PeakWatch watch({{-1, of("abs(x - 0.07)")}, {1, of("x^2")}, {1, of("t")}, {1, of("3")}, {1, of("log(-1 - x^2)")}},
+                  s.simulation);
   REQUIRE(simulate(mechanism, s.simulation, {}, watch.sampling()).ok());
   const std::vector<std::vector<Peak>> found = watch.peaks();
   CHECK(std::abs(found[0].front().value) < 1e-6);  // 1e-5 of a bracket of a step
@@ -102,6 +103,7 @@ TEST_CASE("peaks at kinks, at the ends of a run, and of every method are found w
   CHECK(found[2].size() == 1);
   CHECK(found[2].front().value == 3.2);
   CHECK(found[3].front().value == 3);
+  CHECK(found[4].front().value == -INFINITY);  // nothing finite
 }
 
 TEST_CASE("other objectives do not change beside true extremes", "[peaks]") {
