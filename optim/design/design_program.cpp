@@ -179,17 +179,16 @@ VectorXd DesignProgram::felt_changes() {
     beside(indices[k]) += p.upper && p.value + step > *p.upper ? -step : step;
   }
   const Evaluation there = evaluator_.gradients(beside);
+  const std::vector<Objective>& objectives = evaluator_.of_case(0).objectives();  // psi lists them case by case
   VectorXd felt(start.psi_rho.cols());
   for (Index k = 0; k < felt.size(); ++k) {
     const int index = indices[static_cast<std::size_t>(k)];
     const double step = beside(index) - start.rho(index);
     felt(k) = there.ok || start.rho(index) == 0 ? kInfinity : 0;
     for (Index i = 0; i < start.psi.size(); ++i) {
-      const Objective& objective =
-          evaluator_.of_case(0).objectives()[static_cast<std::size_t>(i) % evaluator_.of_case(0).objectives().size()];
-      const bool is_bent = there.ok && step != 0 && !objective.is_extreme();
-      felt(k) =
-          std::min(felt(k), alters(i, k, is_bent ? std::abs((there.psi_rho(i, k) - start.psi_rho(i, k)) / step) : 0));
+      const bool is_extreme = objectives[static_cast<std::size_t>(i) % objectives.size()].is_extreme();
+      const double bend = there.psi_rho.size() > 0 ? there.psi_rho(i, k) - start.psi_rho(i, k) : 0;
+      felt(k) = std::min(felt(k), alters(i, k, there.ok && step != 0 && !is_extreme ? std::abs(bend / step) : 0));
     }
   }
   return felt;

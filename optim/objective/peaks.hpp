@@ -36,7 +36,7 @@ class PeakWatch {
  public:
   PeakWatch(std::vector<Watched> watched, const SimulationSettings& settings);
 
-  // Of the run to watch, which begins anew. The watch outlives it.
+  // Returns what the run to watch is given. The watch begins anew, and must outlive the run.
   Sampling sampling();
   // After the run: per expression at least one peak, the most extreme one first.
   std::vector<std::vector<Peak>> peaks() const;

@@ -76,14 +76,14 @@ def text_of(problem):
 def places(value):
     """Every place of a value as (holder, key), outermost first."""
     found = []
-    todo = [value]
-    while todo:
-        holder = todo.pop(0)
+    waiting = [value]
+    while waiting:
+        holder = waiting.pop(0)
         keys = list(holder) if isinstance(holder, dict) else range(len(holder)) if isinstance(holder, list) else []
         for key in keys:
             found.append((holder, key))
             if isinstance(holder[key], (dict, list)):
-                todo.append(holder[key])
+                waiting.append(holder[key])
     return found
 
 

@@ -12,7 +12,7 @@ using namespace mbsopt::testing;
 
 namespace {
 
-// What is said of the law of a drive that turns a rod, between two times.
+// Returns the objection to the law of a drive that turns a rod, between two times.
 std::string words_about(const std::string& law, double from, double to) {
   Scene s;
   s.bodies.push_back(plain_body("rod", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
