@@ -113,9 +113,10 @@ void ForceTerms::add_pair(std::size_t body1, std::size_t body2, const std::vecto
   }
 }
 
-void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_torques) {
+void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_springs,
+                            bool but_torques) {
   const ForceInputs in = inputs(at);
-  for_each(false, [&]<class Kind>(const Kind& f, std::size_t i, std::size_t j) {
+  for_each(but_springs, [&]<class Kind>(const Kind& f, std::size_t i, std::size_t j) {
     constexpr bool is_torque = std::is_same_v<Kind, RsdaForce> || std::is_same_v<Kind, TurningFriction>;
     if (is_torque && but_torques) return;
     const Frame &f1 = at.frames[i], &f2 = at.frames[j];

@@ -33,7 +33,8 @@ class ForceTerms {
   void mark_units(std::vector<bool>& bodies) const;  // marks those that add_blocks() reads
   // but_torques leaves out torques about hinges and free torques. A free torque is an applied torque with components in
   // global axes that reads no sensor.
-  void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_torques = false);
+  void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_springs = false,
+                  bool but_torques = false);
   static bool is_free_torque(const AppliedForce& f) { return f.is_torque && !f.in_body_axes && f.sensors.empty(); }
   // visitor(body, components)
   template <class Visitor>

@@ -15,12 +15,12 @@ bool any_force_but_springs(const MechanismData& d) {
   return d.forces->size() > d.forces->of<TsdaForce>().size() || !d.applied.empty() || !d.user_forces.empty();
 }
 
-// Returns whether torques about hinges and free torques are the only forces that depend on the state.
-bool nothing_but_torques(const MechanismData& d) {
-  return d.forces->size() == d.forces->of<RsdaForce>().size() + d.forces->of<TurningFriction>().size() &&
-         d.user_forces.empty() && std::ranges::all_of(d.applied, [](const AppliedForce& f) {
-           return !depends_on_state(f) || ForceTerms::is_free_torque(f);
-         });
+// Returns whether springs, torques about hinges and free torques are the only forces that depend on the state.
+bool nothing_but_springs_and_torques(const MechanismData& d) {
+  const std::size_t torques = d.forces->of<RsdaForce>().size() + d.forces->of<TurningFriction>().size();
+  return d.forces->size() == d.forces->of<TsdaForce>().size() + torques && d.user_forces.empty() &&
+         std::ranges::all_of(
+             d.applied, [](const AppliedForce& f) { return !depends_on_state(f) || ForceTerms::is_free_torque(f); });
 }
 
 std::vector<std::size_t> bodies_with_inertial_slots(const MechanismData& data) {
@@ -45,7 +45,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       solver_(data, rows_of<InPlane>(data, settings_.alpha), settings_.compliance),
       springs_(data),
       torques_(data),
-      only_torques_(torques_.lie_in_plane() && nothing_but_torques(data)),
+      only_torques_(torques_.lie_in_plane() && nothing_but_springs_and_torques(data)),
       has_springs_(!data.forces->of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
       forces_(data),

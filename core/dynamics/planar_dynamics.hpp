@@ -4,8 +4,8 @@
 //   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
 //
 // without the gyroscopic term. Springs act in the plane if their points lie in one plane. Other forces, and derivatives
-// of torques in the fields, are evaluated in space and reduced to the plane. Derivatives of torques in the state are
-// taken in the plane. Only the first tangent allocates after construction.
+// of springs and torques in the fields, are evaluated in space and reduced to the plane. Those of springs and torques
+// in the state are taken in the plane. Only the first tangent allocates after construction.
 #pragma once
 
 #include <optional>
@@ -53,6 +53,7 @@ class PlanarDynamics {
   void prepare_tangents();  // the common part of all directions, after linearise()
   void prepare_force_tangents();
   void add_torque_blocks();
+  void add_spring_blocks();
   void add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir);
   void add_other_tangents(const ParameterBlock& block, const LaneRows& y_dir);
   void add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
@@ -79,7 +80,7 @@ class PlanarDynamics {
   PlanarSprings springs_;
   bool springs_in_plane_ = false;  // at this state
   PlanarTorques torques_;
-  const bool only_torques_;  // in the plane; no other force depends on the state
+  const bool only_torques_;  // in the plane; no other force but springs depends on the state
   // The forces, and the bodies in space that they read and load.
   bool has_springs_, has_other_forces_;
   bool in_space_ = false;  // whether the bodies are placed there at this state

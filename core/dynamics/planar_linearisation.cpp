@@ -52,11 +52,12 @@ void PlanarDynamics::prepare_force_tangents() {
   ForceLinearisation& x = *force_linearisation_;
   for (ForceLinearisation::Block& block : x.in_plane) block = {};
   if (torques_.lie_in_plane()) add_torque_blocks();
-  if (only_torques_) return;
+  if (springs_in_plane_) add_spring_blocks();
+  if (only_torques_ && springs_in_plane_ == has_springs_) return;
   if (!in_space_) place_in_space();
   x.blocks.set_zero();
   for (const std::size_t k : loaded_) set_unit_tangents(frames_in_space_[k], x.units[k]);
-  forces_.add_blocks(here(), x.units, x.blocks, torques_.lie_in_plane());
+  forces_.add_blocks(here(), x.units, x.blocks, springs_in_plane_, torques_.lie_in_plane());
   user_.add_blocks(here(), no_mass_terms_, x.blocks);
   for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
     const MotionBlocks::Block<6>& block = x.blocks.b[k];
@@ -112,6 +113,47 @@ void PlanarDynamics::add_torque_blocks() {
     block.q.row(2).tail<2>() += 2 * c(model_.n) * Eigen::RowVector2d(P.re, P.im);
     block.filled = true;
   });
+}
+
+// Point b of a spring is at r + A s with A = P^2, so that, with the signs -1 for body 1 and 1 for body 2,
+//   d' = sum sign (r' + 2 P s P'),   ddot' = sum sign (rdot' + 2 Pdot s P' + 2 P s Pdot')
+// Body 1 is loaded by (F, A s x F), body 2 by the opposite, where F' = K d' + C ddot' and the arm A s turns with P'.
+void PlanarDynamics::add_spring_blocks() {
+  ForceLinearisation& x = *force_linearisation_;
+  const auto product = [](const Plane& g) {
+    Mat<2, 2> block;
+    block << g.re, -g.im, g.im, g.re;
+    return block;
+  };
+  for (std::size_t k = 0; k < springs_.count(); ++k) {
+    const PlanarTension spring = springs_.tension(k, t_, frames_, forces_.law_scratch());
+    for (const bool read_first : {true, false}) {
+      const std::size_t read = read_first ? spring.body1 : spring.body2;
+      if (read == 0) continue;
+      const double sign = read_first ? -1 : 1;
+      const Plane s = read_first ? spring.s1 : spring.s2, by_P = 2 * (bodies_[read].P * s);
+      Mat<2, 4> by_q, by_v;  // of F
+      by_q << spring.K, spring.K * product(by_P) + spring.C * product(2 * (bodies_[read].Pdot * s));
+      by_v << spring.C, spring.C * product(by_P);
+      for (const bool load_first : {true, false}) {
+        const std::size_t loaded = load_first ? spring.body1 : spring.body2;
+        if (loaded == 0) continue;
+        const Plane arm = frames_[loaded].A * (load_first ? spring.s1 : spring.s2);
+        const double factor = load_first ? sign : -sign;
+        const Eigen::RowVector2d across(-arm.im, arm.re);
+        ForceLinearisation::Block& block =
+            x.in_plane[at(x.blocks.pair(static_cast<int>(loaded), static_cast<int>(read)))];
+        block.q.topRows<2>() += factor * by_q;
+        block.q.row(2) += factor * across * by_q;
+        block.v.topRows<2>() += factor * by_v;
+        block.v.row(2) += factor * across * by_v;
+        block.filled = true;
+        if (loaded != read) continue;
+        const Plane turned = conj(by_P) * spring.F;  // (g P') x F = Im(conj(g P') F)
+        block.q.row(2).tail<2>() += -sign * Eigen::RowVector2d(turned.im, -turned.re);
+      }
+    }
+  }
 }
 
 // Adds the tangent of the forces to b: in the state by their blocks, and in the fields.

@@ -49,6 +49,27 @@ void PlanarSprings::add_loads(double t, const std::vector<PlanarFrame<double>>& 
   }
 }
 
+// With l' = u'd' and ldot' = u'ddot' + (ddot - ldot u)'d'/l:
+//   F = f(l, ldot) u,   K = u (f_x u + f_xdot (ddot - ldot u)/l)' + f/l (I - u u'),   C = f_xdot u u'
+PlanarTension PlanarSprings::tension(std::size_t spring, double t, const std::vector<PlanarFrame<double>>& frames,
+                                     Law::Scratch& scratch) const {
+  const Spring& s = springs_[spring];
+  const SpringSpan<Plane> x = span(s, frames);
+  PlanarTension out{s.body1, s.body2, s.s1, s.s2, {}, Mat<2, 2>::Zero(), Mat<2, 2>::Zero()};
+  if (x.l == 0) {
+    if (s.force->is_k_times_d()) out.K.diagonal().setConstant(s.force->law.k);
+    return out;
+  }
+  const Law::Value f = s.force->law.derivatives(t, data_.rho, x.l, x.ldot, scratch);
+  const auto vector = [](const Plane& z) { return Vec<2>(z.re, z.im); };
+  const Vec<2> u = vector(x.u);
+  out.F = f.f * x.u;
+  out.K = u * (f.f_x * u + (f.f_xdot / x.l) * vector(x.ddot - x.ldot * x.u)).transpose();
+  out.K += (f.f / x.l) * (Mat<2, 2>::Identity() - u * u.transpose());
+  out.C = f.f_xdot * u * u.transpose();
+  return out;
+}
+
 // The planar form of TsdaForce::pull_back.
 void PlanarSprings::add_pull_back(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
                                   std::vector<PlanarFrameBar>& bars, Eigen::VectorXd& theta_bar,

@@ -61,6 +61,23 @@ double size_of(const MatrixXd& x) { return x.cwiseAbs().maxCoeff<Eigen::Propagat
 // Largest difference, relative to the largest entry.
 double apart(const MatrixXd& x, const MatrixXd& y) { return size_of(x - y) / std::max(size_of(y), 1e-300); }
 
+// Springs between moving bodies, whose points lie in the plane: of a law, with damping and free length, and k d.
+void set_springs_in_plane(Scene& scene, int normal) {
+  const auto spring = [&](const char* body1, const VectorField& point1, const char* body2, const VectorField& point2) {
+    Tsda s;
+    s.body1 = body1, s.point1 = point1, s.body2 = body2, s.point2 = point2;
+    return s;
+  };
+  const auto at = [&](const char* a, const char* b) { return along(normal, a, b, "0"); };
+  Tsda lawful = spring("crank", at("c1", "0.2"), "plate", at("-0.3", "edge"));
+  lawful.law = f("k*(l - rest)^2 + mu*ldot^3 + 0.2*ldot*l");
+  Tsda damped = spring("coupler", at("c2", "0.1"), "bar", at("q", "-0.2"));
+  damped.stiffness = f("k"), damped.damping = 0.8, damped.free_length = f("rest");
+  Tsda plain = spring("ground", at("px", "1"), "wheel", at("0.1", "0.2"));
+  plain.stiffness = f("k");
+  scene.forces = {{"lawful", lawful}, {"damped", damped}, {"plain", plain}};
+}
+
 // ydot' = (v', a')
 LaneRows tangent(Dynamics& dynamics, const ParameterBlock& block, const LaneRows& y_dir) {
   LaneRows out(y_dir.rows(), kLanes);
@@ -75,9 +92,10 @@ TEST_CASE("planar accelerations, their tangent and their adjoint are the spatial
   const std::string form = GENERATE(as<std::string>{}, "augmented_lagrangian", "stabilised", "penalty");
   const int normal = GENERATE(2, 0, 1);
   Scene scene = planar_machine(normal, form != "penalty");  // which gives way to loads across the plane
-  enum class Acting { all, torques, torques_of_known_hinges };
-  const Acting forces = GENERATE(Acting::all, Acting::torques, Acting::torques_of_known_hinges);
-  if (forces != Acting::all)
+  enum class Acting { all, springs, torques, torques_of_known_hinges };
+  const Acting forces = GENERATE(Acting::all, Acting::springs, Acting::torques, Acting::torques_of_known_hinges);
+  if (forces == Acting::springs) set_springs_in_plane(scene, normal);
+  if (forces == Acting::torques || forces == Acting::torques_of_known_hinges)
     std::erase_if(scene.forces, [](const Force& f) { return f.name == "spring" || f.name == "push"; });
   for (Joint& joint : scene.joints) {  // whose angles no parameter shifts; one is about -n
     if (forces != Acting::torques_of_known_hinges || joint.type != "revolute") continue;
