@@ -26,7 +26,7 @@ class DrivenMotion final : public MotionSource {
     motion_.z.assign(at(d_.n), Vec<6>::Zero());
   }
 
-  const Motion& motion(const StatePoint& at) override {
+  const Motion& motion(const StatePoint& at, MotionPart) override {
     if (at.t == t_ && at.y.size() == y_.size() && at.y == y_) return motion_;
     t_ = at.t;
     y_ = at.y;
@@ -43,11 +43,11 @@ class DrivenMotion final : public MotionSource {
     motion_.lambda += J.solve_transposed(flat(left) - J.transposed_times(motion_.lambda));
     return motion_;
   }
-  Motion& bar() override {
+  Motion& bar(MotionPart) override {
     assert(false && "kinematics carries no derivatives");
     return motion_;
   }
-  void fold_bar(const StatePoint&, Eigen::Ref<VectorXd>, Eigen::Ref<VectorXd>) override { bar(); }
+  void fold_bar(const StatePoint&, Eigen::Ref<VectorXd>, Eigen::Ref<VectorXd>) override { bar(MotionPart::all); }
 
  private:
   const MechanismData& d_;
@@ -88,7 +88,7 @@ SimulationResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
     if (run.window_at(at.t))
       for (const RowLaw& law : d.laws)
-        if (law.drive >= 0 && std::isnan(at.motion->motion(at).lambda(law.row)))
+        if (law.drive >= 0 && std::isnan(at.motion->motion(at, MotionPart::in_plane).lambda(law.row)))
           run.singular_at(at.t).note("drive '" + d.drive_names[mbsopt::at(law.drive)] + "'");
     for (const DrivenTerm& term : terms) observe(term.observation, at);
     return true;

@@ -205,14 +205,25 @@ bool PlanarDynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::
   return solver_.factor(frames_);
 }
 
+void PlanarDynamics::linearise_here() {
+  for (std::size_t k = 1; k < bodies_.size(); ++k) set_acceleration(k, z_[k - 1]);
+}
+
+void PlanarDynamics::write_motion(Motion& out) const {
+  for (std::size_t k = 1; k < bodies_.size(); ++k) out.z[k - 1] = bodies_in_y_.in_space(k, z_[k - 1]);
+  out.lambda = lambda_of_phi_;
+}
+
 void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar,
-                                 Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
+                                 Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar, const Motion* motion) {
   const StateLayout layout{data_.n};
   for (std::size_t k = 1; k < bodies_.size(); ++k) {
     const Plane rddot_bar = bodies_in_y_.vector(w, layout.v(k)), Pddot_bar = bodies_in_y_.turn(k, w, layout.pdot(k));
     loads_[k - 1] << rddot_bar.re, rddot_bar.im, 0.5 * cross(bodies_[k].P, Pddot_bar);
+    if (motion) loads_[k - 1] += bodies_in_y_.reduced(k, motion->z[k - 1]);
   }
   g_.setZero();
+  if (motion) model_.gather(motion->lambda, g_);
   solver_.solve(loads_, g_, settings_.derivatives, eta_, mu_);
   y_bar.tail(layout.positions()) += w.head(layout.positions());
 

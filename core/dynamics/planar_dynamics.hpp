@@ -30,9 +30,11 @@ class PlanarDynamics {
   bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                  const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
   void acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir, Eigen::Ref<LaneRows> a_dir);
+  void linearise_here();
   void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
-                   Eigen::VectorXd& rho_bar);
+                   Eigen::VectorXd& rho_bar, const Motion* motion = nullptr);
 
+  void write_motion(Motion& out) const;  // after evaluate()
   const Eigen::VectorXd& lambda() const { return lambda_of_phi_; }
   double usual_acceleration(double enough) const;
   const PlanarSaddleSolver& solver() const { return solver_; }

@@ -11,7 +11,7 @@ namespace mbsopt {
 Frame moving(const StatePoint& at, int body) {
   assert(at.motion);
   Frame b = body_at(at.y, body);
-  if (body > 0) set_acceleration(at.motion->motion(at).z[static_cast<std::size_t>(body - 1)], b);
+  if (body > 0) set_acceleration(at.motion->motion(at, MotionPart::in_plane).z[static_cast<std::size_t>(body - 1)], b);
   return b;
 }
 
@@ -25,7 +25,7 @@ void add_acceleration(const StatePoint& at, const BodyPoint& point, const Vector
   add_pull_back(b, bar, Vector4d::Zero(), Vector3d::Zero(), to.y_bar.segment<7>(layout.q(point.body)),
                 to.y_bar.segment<7>(layout.v(point.body)));
   // X'A (omegadot x s) = omegadot'(s x A'X)
-  Vec<6>& out = at.motion->bar().z[static_cast<std::size_t>(point.body - 1)];
+  Vec<6>& out = at.motion->bar(MotionPart::in_plane).z[static_cast<std::size_t>(point.body - 1)];
   out.head<3>() += to.scale * X;
   out.tail<3>() += to.scale * point.s.cross(b.A.transpose() * X);
 }

@@ -1,8 +1,10 @@
 #include "core/mechanism/reaction_sensor.hpp"
 
 #include <cassert>
+#include <optional>
 
 #include "core/mechanism/constraint_gradient.hpp"
+#include "core/mechanism/planar_model.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 
 namespace mbsopt {
@@ -17,12 +19,22 @@ Vec<P::kRows> weights(const Constraint& c, const Eigen::VectorXd& lambda) {
   return c.factor * lambda.segment<P::kRows>(c.row);
 }
 
-Loads loads_on_body2(const MechanismData& d, const ReactionSensor& s, const Eigen::VectorXd& y,
-                     const Eigen::VectorXd& lambda) {
-  Loads loads;
+// visitor(constraint, body 1, body 2) for those of the joint, whose bodies are placed once
+template <class Visitor>
+void for_each_constraint(const MechanismData& d, const ReactionSensor& s, const Eigen::VectorXd& y, const Frame& b2,
+                         const Visitor& visitor) {
+  std::optional<Frame> b1;
   for (const Constraint& c : d.constraints) {
     if (c.joint != s.joint) continue;
-    const Frame b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    if (!b1) b1 = body_at(y, c.body1);
+    visitor(c, *b1, b2);
+  }
+}
+
+Loads loads_on_body2(const MechanismData& d, const ReactionSensor& s, const Eigen::VectorXd& y, const Frame& on,
+                     const Eigen::VectorXd& lambda) {
+  Loads loads;
+  for_each_constraint(d, s, y, on, [&](const Constraint& c, const Frame& b1, const Frame& b2) {
     std::visit(
         [&]<class P>(const P& p) {
           Mat<P::kRows, 6> J1, J2;
@@ -32,7 +44,7 @@ Loads loads_on_body2(const MechanismData& d, const ReactionSensor& s, const Eige
           loads.T -= f.template tail<3>();
         },
         c.primitive);
-  }
+  });
   return loads;
 }
 
@@ -42,22 +54,29 @@ Vector3d measured(const ReactionSensor& s, const Loads& loads, const Matrix3d& A
 }
 
 // Adds the gradient of -(lambda' J2 eta), with eta of body 2 in its frame and none of body 1.
-void add_pull_back_of_loads(const ReactionSensor& s, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,
-                            const Vec<6>& eta, SensorGradient& to, Eigen::VectorXd& lambda_bar) {
-  for (const Constraint& c : to.data.constraints) {
-    if (c.joint != s.joint) continue;
-    const ConstraintVector change = add_virtual_work_gradient(
-        c, body_at(y, c.body1), body_at(y, c.body2), Vec<6>::Zero(), eta, -lambda.segment(c.row, c.rows()), to);
+void add_pull_back_of_loads(const ReactionSensor& s, const Eigen::VectorXd& y, const Frame& on,
+                            const Eigen::VectorXd& lambda, const Vec<6>& eta, SensorGradient& to,
+                            Eigen::VectorXd& lambda_bar) {
+  for_each_constraint(to.data, s, y, on, [&](const Constraint& c, const Frame& b1, const Frame& b2) {
+    const ConstraintVector change =
+        add_virtual_work_gradient(c, b1, b2, Vec<6>::Zero(), eta, -lambda.segment(c.row, c.rows()), to);
     lambda_bar.segment(c.row, c.rows()) -= to.scale * c.factor * change;
-  }
+  });
 }
 
 }  // namespace
 
+// A row without effect on the motion in a plane loads bodies across it only. Drives act in the plane.
+bool ReactionSensor::is_in_plane(const MechanismData& d) const {
+  if (!d.planar) return false;
+  return drive_row >= 0 || (component != kNorm && torque == (component == d.planar->n));
+}
+
 double ReactionSensor::evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const {
   assert(at.motion);
-  const Motion& motion = at.motion->motion(at);
-  return evaluate(d, at.y, motion.lambda, to, to ? &at.motion->bar().lambda : nullptr);
+  const MotionPart part = is_in_plane(d) ? MotionPart::in_plane : MotionPart::all;
+  const Motion& motion = at.motion->motion(at, part);
+  return evaluate(d, at.y, motion.lambda, to, to ? &at.motion->bar(part).lambda : nullptr);
 }
 
 double ReactionSensor::evaluate(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,
@@ -68,7 +87,7 @@ double ReactionSensor::evaluate(const MechanismData& d, const Eigen::VectorXd& y
   }
   const Frame b2 = body_at(y, body2);
   const Matrix3d& A2 = b2.A;
-  const Loads loads = loads_on_body2(d, *this, y, lambda);
+  const Loads loads = loads_on_body2(d, *this, y, b2, lambda);
   const Vector3d x = measured(*this, loads, A2);
   const double result = component_value(x, component);
   if (!to) return result;
@@ -81,7 +100,7 @@ double ReactionSensor::evaluate(const MechanismData& d, const Eigen::VectorXd& y
   } else {
     eta.head<3>() = c;
   }
-  add_pull_back_of_loads(*this, y, lambda, eta, *to, *lambda_bar);
+  add_pull_back_of_loads(*this, y, b2, lambda, eta, *to, *lambda_bar);
   if (!torque) return result;
   // The gradient through eta itself, with F and T fixed.
   const Vector3d arm_bar = c.cross(loads.F);

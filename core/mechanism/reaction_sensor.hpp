@@ -25,6 +25,7 @@ struct ReactionSensor final : SensorFunction {
   // The same at given lambda; with `to`, lambda_bar gets the gradient in it.
   double evaluate(const MechanismData& data, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,
                   SensorGradient* to, Eigen::VectorXd* lambda_bar) const;
+  bool is_in_plane(const MechanismData& data) const;  // a load within the plane of a planar mechanism
 };
 
 }  // namespace mbsopt

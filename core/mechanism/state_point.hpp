@@ -19,12 +19,16 @@ struct Motion {
 
 struct StatePoint;
 
+// What a sensor reads of the motion. If the mechanism moves in a plane, accelerations and the loads within the plane
+// follow from the equations of the plane alone. Multipliers of other rows are then 0.
+enum class MotionPart { in_plane, all };
+
 // Sensors of accelerations and reactions get the motion from this source (core/dynamics/motion_solver.hpp).
 struct MotionSource {
   virtual ~MotionSource() = default;
-  virtual const Motion& motion(const StatePoint& at) = 0;
-  // A gradient in the motion: zero, until a sensor adds to it.
-  virtual Motion& bar() = 0;
+  virtual const Motion& motion(const StatePoint& at, MotionPart part) = 0;
+  // A gradient in the motion: zero, until a sensor adds to it in the part that it reads.
+  virtual Motion& bar(MotionPart part) = 0;
   // Turns this gradient into one in the state and the parameters, adds it to them, and sets it to zero.
   virtual void fold_bar(const StatePoint& at, Eigen::Ref<Eigen::VectorXd> y_bar,
                         Eigen::Ref<Eigen::VectorXd> rho_bar) = 0;

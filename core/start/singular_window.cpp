@@ -59,14 +59,14 @@ Eigen::ArrayXd SingularWindow::roughness(const Eigen::MatrixXd& x) const {
   return relative(u).max(relative(v));
 }
 
-const Motion& ContinuedMotion::motion(const StatePoint& at) {
+const Motion& ContinuedMotion::motion(const StatePoint& at, MotionPart part) {
   constexpr double kNoLimit = 1e-3;  // of the roughness: 1e-5 for five waves in the width of the nodes, 0.1 for a pole
   const SingularWindow* const w = window_(at.t);
-  if (!w) return solved_.motion(at);
+  if (!w) return solved_.motion(at, part);
   Eigen::MatrixXd z, lambda;
   Index k = 0;
   w->for_nodes(at.t, [&](double, const DrivenState& node) {
-    motion_ = solved_.motion({node.t, node.y, node.angles});
+    motion_ = solved_.motion({node.t, node.y, node.angles}, part);
     z.resize(flat(motion_.z).size(), SingularWindow::kNodes);
     lambda.resize(motion_.lambda.size(), z.cols());
     z.col(k) = flat(motion_.z);
@@ -82,12 +82,13 @@ const Motion& ContinuedMotion::motion(const StatePoint& at) {
 void ContinuedMotion::fold_bar(const StatePoint& at, VecOut y_bar, VecOut rho_bar) {
   const SingularWindow* const w = window_(at.t);
   if (!w) return solved_.fold_bar(at, y_bar, rho_bar);
-  const Motion whole = solved_.bar();
+  Motion& of_node = solved_.bar(MotionPart::all);
+  const Motion whole = of_node;
   Eigen::VectorXd bar(y_bar.size());
   std::size_t k = 0;
   w->for_nodes(at.t, [&](double weight, const DrivenState& node) {
-    solved_.bar().lambda = weight * whole.lambda;
-    for (std::size_t i = 0; i < whole.z.size(); ++i) solved_.bar().z[i] = weight * whole.z[i];
+    solved_.bar(MotionPart::all).lambda = weight * whole.lambda;
+    for (std::size_t i = 0; i < whole.z.size(); ++i) of_node.z[i] = weight * whole.z[i];
     bar.setZero();
     solved_.fold_bar({node.t, node.y, node.angles}, bar, rho_bar);
     if (tangents.empty())

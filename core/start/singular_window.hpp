@@ -66,8 +66,8 @@ class ContinuedMotion final : public MotionSource {
   ContinuedMotion(MotionSource& solved, std::function<const SingularWindow*(double)> window)
       : solved_(solved), window_(std::move(window)) {}
 
-  const Motion& motion(const StatePoint& at) override;
-  Motion& bar() override { return solved_.bar(); }
+  const Motion& motion(const StatePoint& at, MotionPart part) override;
+  Motion& bar(MotionPart part) override { return solved_.bar(part); }
   // Within a window a gradient in the motion becomes one in the states of the nodes. It adds to y_bars or, if tangents
   // are known, to rho_bar.
   void fold_bar(const StatePoint& at, VecOut y_bar, VecOut rho_bar) override;

@@ -277,7 +277,7 @@ TEST_CASE("MBSVT: acceleration_dynamics at a state", "[mbsvt]") {
   const Mechanism mechanism(scene, VectorXd::Constant(1, 1.2));
   const Assembly assembly(mechanism, 0);
   MotionSolver solver(mechanism, scene.simulation.formulation);
-  const Motion& motion = solver.motion({0, assembly.result().y, assembly.result().angles});
+  const Motion& motion = solver.motion({0, assembly.result().y, assembly.result().angles}, MotionPart::all);
   CHECK(motion.z[0](5) == Approx(-1.5 * 9.81 / 1.2).epsilon(1e-12));  // omegadot = -m g L/2 / (m L^2/3)
   CHECK(motion.z[0](1) == Approx(-0.75 * 9.81).epsilon(1e-12));
 }

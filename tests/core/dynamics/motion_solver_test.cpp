@@ -4,6 +4,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/mechanism/planar_model.hpp"
+#include "tests/core/dynamics/planar_scenes.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
@@ -227,5 +229,67 @@ TEST_CASE("derivatives of accelerations, reactions and efforts equal differences
           1e-4);
       CHECK(std::abs(rho_bar(k) - expected) < 1e-6 * size);
     }
+  }
+}
+
+// The equations of space also where those of the plane suffice.
+class MotionInSpace final : public MotionSource {
+ public:
+  explicit MotionInSpace(const Mechanism& mechanism) : solver_(mechanism, {}) {}
+  const Motion& motion(const StatePoint& at, MotionPart) override { return solver_.motion(at, MotionPart::all); }
+  Motion& bar(MotionPart) override { return solver_.bar(MotionPart::all); }
+  void fold_bar(const StatePoint& at, VecOut y_bar, VecOut rho_bar) override { solver_.fold_bar(at, y_bar, rho_bar); }
+
+ private:
+  MotionSolver solver_;
+};
+
+TEST_CASE("what lies in the plane of a mechanism is the same by the equations of the plane", "[sensor]") {
+  const int normal = GENERATE(2, 0, 1);
+  const std::string t1 = std::string("xyz").substr((normal + 1) % 3, 1), n = std::string("xyz").substr(normal, 1);
+  Scene scene = planar_machine(normal);
+  const std::size_t first = scene.sensors.size();
+  scene.sensors.push_back(point_sensor("a", "acceleration", "plate", along(normal, "edge", "0.2", "0.1"), t1));
+  scene.sensors.push_back(point_sensor("a_bar", "acceleration", "bar", along(normal, "q", "0.1", "0"), "norm"));
+  scene.sensors.push_back(reaction("force", "B", "force", t1));
+  scene.sensors.push_back(reaction("rail_torque", "rail", "torque", n));
+  Sensor effort;
+  effort.name = "effort", effort.quantity = "drive_force", effort.drive = "motor";
+  scene.sensors.push_back(effort);
+  scene.sensors.push_back(reaction("across", "B", "torque", t1));  // the equations of space
+  const Mechanism mechanism(scene, nominal(scene));
+  const MechanismData& d = mechanism.data();
+  REQUIRE(d.planar);
+  VectorXd y = VectorXd::Zero(14 * d.n);
+  for (int i = 1; i <= d.n; ++i) {
+    const PlanarBody& b = d.planar->bodies[static_cast<std::size_t>(i)];
+    y.segment<7>(7 * (i - 1)) = d.bodies[static_cast<std::size_t>(i)].q;
+    y(7 * (d.n + i - 1) + d.planar->t1) = 0.3 * i;
+    y.segment<4>(7 * (d.n + i - 1) + 3) = 0.2 * b.p_a - 0.1 * i * b.p_b;
+  }
+  const VectorXd angles = VectorXd::Zero(static_cast<Eigen::Index>(d.angles.size()));
+  MotionSolver planar(mechanism, {});
+  MotionInSpace spatial(mechanism);
+  const auto gradient = [&](std::size_t sensor, MotionSource& source) {
+    VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(d.rho.size());
+    const double value =
+        mechanism.add_sensor_gradient(static_cast<int>(sensor), {0.4, y, angles, &source}, 1, y_bar, rho_bar);
+    VectorXd all(1 + 8 * d.n + rho_bar.size());  // in directions of the plane
+    all(0) = value;
+    Eigen::Index k = 1;
+    for (int i = 0; i < 2 * d.n; ++i) {
+      const PlanarBody& b = d.planar->bodies[static_cast<std::size_t>(i % d.n + 1)];
+      const auto of = y_bar.segment<7>(7 * i);
+      for (const double x : {of(d.planar->t1), of(d.planar->t2), b.p_a.dot(of.tail<4>()), b.p_b.dot(of.tail<4>())})
+        all(k++) = x;
+    }
+    all.tail(rho_bar.size()) = rho_bar;
+    return all;
+  };
+  for (std::size_t i = first; i < scene.sensors.size(); ++i) {
+    INFO(scene.sensors[i].name);
+    const VectorXd expected = gradient(i, spatial);
+    CHECK(expected.tail(expected.size() - 1).norm() > 0);
+    CHECK((gradient(i, planar) - expected).norm() < 1e-9 * expected.norm());
   }
 }
