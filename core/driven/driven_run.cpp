@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <boost/math/interpolators/barycentric_rational.hpp>
+#include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 
 #include "core/body/hermite.hpp"
@@ -91,6 +93,7 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
       events_({}, settings.start_time, settings.end_time),
       shortest_(1e-9 * std::max(1e-3, settings.end_time - settings.start_time)),
       h_(settings.end_time - settings.start_time),
+      switches_(mechanism, costs),
       result_(result_at_start(start, settings.start_time, costs.size())) {
   if (!motion && mechanism.data().needs_motion) motion = &motion_.emplace(mechanism, settings.formulation);
   if (motion) continued_.emplace(*motion, [this](double t) { return window_at(t); });
@@ -196,7 +199,7 @@ double DrivenRun::next_end() {
     const bool last = panel + 1 == frozen_->times.size() && frozen_->to_the_end;
     return last ? end : frozen_->times[panel] + frozen_->sizes[panel];
   }
-  const double stop_at = events_.stop_after(t);
+  const double stop_at = kink_ > t ? std::min(kink_, events_.stop_after(t)) : events_.stop_after(t);
   h_ = std::min(h_, largest_panel());
   const double t1 = resolved_until(instants_, t, h_ >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + h_);
   // Without integrals a panel ends at the next event, so that no part of the path is solved twice.
@@ -204,16 +207,47 @@ double DrivenRun::next_end() {
   return running_.empty() && event > t ? std::min(t1, event) : t1;
 }
 
+// The instant after which a switch of a running cost has another sign, in the panel whose nodes are known. The search
+// follows the path. Returns -INFINITY if there is none.
+double DrivenRun::first_kink() {
+  for (std::size_t k = 1; k < nodes_.size(); ++k) {
+    double first = INFINITY;
+    for (std::size_t s = 0; s < switches_.count(); ++s) {
+      const auto at = [&](const DrivenState& state) { return switches_.value(s, point_of(state)); };
+      const double before = at(nodes_[k - 1]), after = at(nodes_[k]);
+      if (!(before * after < 0)) continue;
+      bool found = true;
+      const auto value = [&](double t) {
+        if (path_.state().t > t) path_.start(nodes_[k - 1]);
+        found = found && go_to(t);
+        return at(path_.state());
+      };
+      const auto near = [&](double a, double b) { return b - a <= shortest_ || !found; };
+      path_.start(nodes_[k - 1]);
+      std::uintmax_t most = 60;  // bisection needs 30
+      const auto ends =
+          boost::math::tools::toms748_solve(value, nodes_[k - 1].t, nodes_[k].t, before, after, near, most);
+      if (found) first = std::min(first, ends.second);
+    }
+    if (first < INFINITY) return first;
+  }
+  return -INFINITY;
+}
+
 // Other steps may pass where the path ended. If it ends there again, so does the panel.
 void DrivenRun::try_shorter(Panel outcome, double t1) {
   const double t = from_.t, reached = path_.state().t;
   ++result_.statistics.rejected;
   ++result_.statistics.rejections.error_test;
-  path_.start(from_);
   const bool is_stuck = outcome == Panel::stuck;
+  const double kink = is_stuck ? -INFINITY : first_kink();
+  path_.start(from_);
   const bool ends = is_stuck && std::abs(reached - ended_at_) <= kSameEnd * (settings_.end_time - t);
   if (is_stuck) ended_at_ = reached;
-  h_ = ends ? reached - t : (t1 - t) / 2;
+  if (kink > t + shortest_)
+    kink_ = kink;
+  else
+    h_ = ends ? reached - t : (t1 - t) / 2;
 }
 
 void DrivenRun::stop_at_singular_matrix() {

@@ -6,7 +6,8 @@
 //
 // Two nodes of a panel may enclose a narrow peak that neither formula sees. So g is also evaluated between nodes that
 // are more than max_step or a 75th of the run apart, on Hermite's cubic, and compared with the polynomial through
-// the nodes. Panels resolve what changes with time alone in any case (timed_instants.hpp).
+// the nodes. Panels resolve what changes with time alone in any case (timed_instants.hpp). A panel that is refused ends
+// next at the first kink between its nodes, so that few panels resolve it, and derivatives have one branch in each.
 //
 // The panels are the steps of the result: given again (RunOptions::frozen), they make psi a smooth function of rho.
 #pragma once
@@ -19,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "core/driven/cost_switches.hpp"
 #include "core/driven/kronrod.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/run/cost.hpp"
@@ -81,6 +83,7 @@ class DrivenRun {
   bool is_too_fast();
   double next_end();
   void try_shorter(Panel outcome, double t1);
+  double first_kink();
   Panel try_panel(double t1);
   double allowed_error(const Integral& integral, double h) const;
   bool hides_a_peak(double h);
@@ -115,6 +118,8 @@ class DrivenRun {
   const double shortest_;           // step or panel [s]
   double h_;                        // of the next panel [s]
   double ended_at_ = -INFINITY;     // the time at which a panel was stuck last
+  CostSwitches switches_;
+  double kink_ = -INFINITY;  // of a running cost: no panel passes it
   std::vector<Integral> running_;
   std::vector<DrivenTerm> at_instant_;
   std::vector<DrivenState> nodes_;  // of the panel; none without running costs

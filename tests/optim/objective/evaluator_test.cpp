@@ -191,7 +191,7 @@ TEST_CASE("a peak that a solved run passes over is said", "[gradient]") {
     return missed_peaks(evaluator.objectives(), e.psi, evaluator.true_values(evaluator.start()));
   };
   CHECK(said(0.1).empty());
-  const std::vector<std::string> narrow = said(1e-3);
+  const std::vector<std::string> narrow = said(3e-4);
   REQUIRE(narrow.size() == 1);
   CHECK_THAT(narrow[0], Contains("'peak'") && Contains("the true extreme is 1") && Contains("max_step"));
   Evaluator evaluator(scene, {Objective(scene, peak)});
