@@ -196,14 +196,13 @@ void ConstraintRows::add_shared_square(const Eigen::VectorXd& alpha, BlockCholes
   }
 }
 
-Eigen::MatrixXd ConstraintRows::dense() const {
+void ConstraintRows::write_dense(Eigen::MatrixXd& J) const {
   const StateLayout layout{data_->n};
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(data_->m, 6 * data_->n);
+  J.setZero(data_->m, 6 * data_->n);
   for (const RowGroup& g : data_->groups) {
     if (g.body1 > 0) J.block(g.row, layout.z(g.body1), g.rows, 6) += J1.middleRows(g.block, g.rows);
     if (g.body2 > 0) J.block(g.row, layout.z(g.body2), g.rows, 6) += J2.middleRows(g.block, g.rows);
   }
-  return J;
 }
 
 BlockCholesky<6> ConstraintRows::matrix() const { return BlockCholesky<6>(data_->n, edges_); }

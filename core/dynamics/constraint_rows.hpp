@@ -41,7 +41,7 @@ class ConstraintRows : public RowProducts<ConstraintRows, RowsInSpace> {
     return out;
   }
 
-  Eigen::MatrixXd dense() const;  // J, 6 columns per moving body
+  void write_dense(Eigen::MatrixXd& J) const;  // 6 columns per moving body
 
   BlockCholesky<6> matrix() const;  // a matrix with the pattern of J'J
 

@@ -72,8 +72,8 @@ void PlanarRows::evaluate(const Frames& frames) {
   }
 }
 
-Eigen::MatrixXd PlanarRows::dense() const {
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(count(), 3 * static_cast<Eigen::Index>(bodies_.size()));
+void PlanarRows::write_dense(Eigen::MatrixXd& J) const {
+  J.setZero(count(), 3 * static_cast<Eigen::Index>(bodies_.size()));
   const auto add_point = [&](const Point& p, int body, double sign, const double* x) {  // sign (I, i x)
     if (body == 0) return;
     const Eigen::Index first = 3 * (body - 1);
@@ -88,7 +88,6 @@ Eigen::MatrixXd PlanarRows::dense() const {
   }
   for (const Entry& e : entries_)
     for (int k = 0; k < 3; ++k) J(e.row, 3 * (e.body - 1) + k) += e.J[k];
-  return J;
 }
 
 void PlanarRows::assemble(const Frames& frames, const Eigen::VectorXd& alpha, BlockCholesky<3>& S,

@@ -37,7 +37,7 @@ class PlanarRows : public RowProducts<PlanarRows, RowsInPlane> {
     to[2] = b.inertia * from[2];
     return out;
   }
-  Eigen::MatrixXd dense() const;  // J, 3 columns per moving body
+  void write_dense(Eigen::MatrixXd& J) const;  // 3 columns per moving body
   BlockCholesky<3> matrix() const { return BlockCholesky<3>(static_cast<int>(model_->bodies.size()) - 1, edges_); }
 
   RowsInPlane view() const {

@@ -110,12 +110,14 @@ bool SquareFactor::compute(const MatrixXd& A) {
   return n > 0 && least > kSingular * largest;
 }
 void SquareFactor::solve(Eigen::Ref<VectorXd> b) {
-  x_ = b(order_);
+  x_.resize(b.size());
+  for (Index i = 0; i < b.size(); ++i) x_(i) = b(order_(i));  // Eigen's b(order_) copies the order
   solve_permuted(x_);
   b = x_;
 }
 void SquareFactor::solve_lanes(Eigen::Ref<LaneRows> b) {
-  lanes_ = b(order_, Eigen::all);
+  lanes_.resize(b.rows(), b.cols());
+  for (Index i = 0; i < b.rows(); ++i) lanes_.row(i) = b.row(order_(i));
   solve_permuted(lanes_);
   b = lanes_;
 }
@@ -127,7 +129,7 @@ void SquareFactor::solve_transposed(Eigen::Ref<VectorXd> b) {  // U'L'(P x) = b
   }
   for (Index i = x_.size() - 1; i > 0; --i)
     for (Index j = 0; j < i; ++j) x_(j) -= LU_(i, j) * x_(i);
-  b(order_) = x_;
+  for (Index i = 0; i < x_.size(); ++i) b(order_(i)) = x_(i);
 }
 
 MatrixXd null_space(const MatrixXd& A, double threshold) {
@@ -165,6 +167,33 @@ RightSingular right_singular(const MatrixXd& A) {
   return {svd.singularValues(), svd.matrixV()};
 }
 
+namespace {
+
+constexpr Index kSmall = 32;  // columns: plain loops then take a third of the time of Eigen's blocks
+
+// Replaces the lower triangle of a symmetric G by L, G = L L'. Returns false if G is not positive definite.
+bool cholesky_in_place(MatrixXd& G) {
+  if (G.rows() > kSmall) return Eigen::LLT<Eigen::Ref<MatrixXd>>(G).info() == Eigen::Success;
+  for (Index k = 0; k < G.rows(); ++k) {
+    if (!(G(k, k) > 0)) return false;
+    auto column = G.col(k).tail(G.rows() - k);
+    column /= std::sqrt(G(k, k));
+    for (Index j = k + 1; j < G.rows(); ++j)
+      G.col(j).tail(G.rows() - j).noalias() -= G(j, k) * column.tail(G.rows() - j);
+  }
+  return true;
+}
+void solve_with_cholesky(const MatrixXd& L, VectorXd& b) {
+  const Index n = L.rows();
+  for (Index k = 0; k < n; ++k) {
+    b(k) /= L(k, k);
+    b.tail(n - k - 1) -= b(k) * L.col(k).tail(n - k - 1);
+  }
+  for (Index k = n - 1; k >= 0; --k) b(k) = (b(k) - L.col(k).tail(n - k - 1).dot(b.tail(n - k - 1))) / L(k, k);
+}
+
+}  // namespace
+
 // Takes the least eigenvalue of G = A'A, or AA' if that is smaller, and its vector x by inverse iteration. With the
 // Rayleigh quotient theta and the residual r of x, an eigenvalue is within r of theta, and the least one is below
 // theta. If G - (theta - 2 r) I has a Cholesky factor, none is below the shift, which then speeds up the iteration. As
@@ -175,19 +204,23 @@ LeastSingular least_singular(const MatrixXd& A) {
   constexpr double kNearer = 0.1;             // what a factor has to gain: it costs as much as three steps
   constexpr int kMost = 30;                   // eight to ten are usual
   const bool is_wide = A.rows() < A.cols();
-  const MatrixXd G = is_wide ? MatrixXd(A * A.transpose()) : MatrixXd(A.transpose() * A);
+  const MatrixXd tall = is_wide ? MatrixXd(A.transpose()) : A;
+  const MatrixXd G =
+      tall.cols() <= kSmall ? MatrixXd(tall.transpose().lazyProduct(tall)) : MatrixXd(tall.transpose() * tall);
   const double largest = G.trace();  // not below the largest eigenvalue
-  Eigen::LLT<MatrixXd> factor(G);
+  MatrixXd L = G, nearer;
+  const bool has_inverse = cholesky_in_place(L);
   double shift = 0;
   VectorXd inner = VectorXd::LinSpaced(G.rows(), 1, 2).normalized(), before;  // of no symmetry of mechanisms
-  MatrixXd shifted;
-  for (int k = 0; factor.info() == Eigen::Success && k < kMost; ++k) {
-    before = std::exchange(inner, factor.solve(inner).normalized());
+  for (int k = 0; has_inverse && k < kMost; ++k) {
+    before = inner;
+    solve_with_cholesky(L, inner);
+    inner.normalize();
     const VectorXd image = G * inner;
     const double theta = inner.dot(image);
     if (!(theta > kFarAboveRounding * kFarAboveRounding * largest)) break;
     if (shift > 0 && (inner - before).norm() <= 1e-14) {
-      VectorXd outer = is_wide ? VectorXd(A.transpose() * inner) : VectorXd(A * inner);
+      VectorXd outer = tall * inner;
       const double value = outer.norm();
       outer /= value;
       if (is_wide) inner.swap(outer);
@@ -195,11 +228,10 @@ LeastSingular least_singular(const MatrixXd& A) {
     }
     const double lower = theta - 2 * (image - theta * inner).norm() - kShift * largest;
     if (theta - lower > kNearer * (theta - shift)) continue;
-    shifted = G;
-    shifted.diagonal().array() -= lower;
-    Eigen::LLT<MatrixXd> nearer(shifted);
-    if (nearer.info() != Eigen::Success) continue;
-    factor = std::move(nearer);
+    nearer = G;
+    nearer.diagonal().array() -= lower;
+    if (!cholesky_in_place(nearer)) continue;
+    L.swap(nearer);
     shift = lower;
   }
   const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);

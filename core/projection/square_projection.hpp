@@ -13,7 +13,7 @@ namespace mbsopt {
 template <class Body>
 bool ProjectorOf<Body>::factor_square() {
   rows_.evaluate(frames_);
-  J_ = rows_.dense();
+  rows_.write_dense(J_);
   ++square_factorisations_;
   return J_factor_.compute(J_);
 }
@@ -117,7 +117,7 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
     displace(moved);
     constraints_.phi(frames_, laws_, angles, phi_);
     rows_.evaluate(frames_);
-    J_ = rows_.dense();
+    rows_.write_dense(J_);
     const double determinant = J_.determinant();
     if (sign == 0) sign = determinant;
     return determinant * sign > 0 ? phi_.norm() : INFINITY;
@@ -163,7 +163,7 @@ double ProjectorOf<Body>::approach(double t, const Y& angles, Y& y, Y& theta_bar
   Y trial = y;
   for (int k = 0; k < kMost && violation > kProjectionRounding; ++k) {
     rows_.evaluate(frames_);
-    J_ = rows_.dense();
+    rows_.write_dense(J_);
     const Y gradient = J_.transpose() * phi_;
     Eigen::MatrixXd A = J_.transpose() * J_;
     A.diagonal().array() += damping * violation;

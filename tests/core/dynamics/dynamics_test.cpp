@@ -131,7 +131,8 @@ TEST_CASE("accelerations equal a dense solution of the constrained equations", "
     f.segment<3>(6 * i - 6) = b.mass * d.gravity;
     f.segment<3>(6 * i - 3) = -omega.cross(b.J * omega);
   }
-  const MatrixXd J = dynamics.solver().rows().dense();
+  MatrixXd J;
+  dynamics.solver().rows().write_dense(J);
   MatrixXd KKT = MatrixXd::Zero(18 + d.m, 18 + d.m);
   KKT.topLeftCorner(18, 18) = M;
   KKT.topRightCorner(18, d.m) = J.transpose();

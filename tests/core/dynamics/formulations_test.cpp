@@ -59,7 +59,9 @@ VectorXq exact(SpatialDynamics& at, const Quad& c) {
     K.block<3, 3>(6 * i, 6 * i).diagonal().setConstant(b.mass);
     K.block<3, 3>(6 * i + 3, 6 * i + 3) = b.J.cast<Quad>();
   }
-  const MatrixXq J = at.solver().rows().dense().cast<Quad>();
+  Eigen::MatrixXd rows;
+  at.solver().rows().write_dense(rows);
+  const MatrixXq J = rows.cast<Quad>();
   K.bottomLeftCorner(d.m, n) = J;
   K.topRightCorner(n, d.m) = J.transpose();
   K.bottomRightCorner(d.m, d.m).diagonal().setConstant(-c);
