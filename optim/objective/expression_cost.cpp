@@ -27,6 +27,7 @@ namespace {
 struct Scratch {
   Program::Scratch program;
   std::vector<double> x, gradient;
+  Eigen::VectorXd y_bar, rho_bar;
 
   void grow(const Program& p, int inputs) {
     const std::size_t n = static_cast<std::size_t>(inputs);
@@ -62,6 +63,8 @@ class ExpressionCost : public PointCost {
   }
 
   double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    if (compiled_->slopes_read_sensors && compiled_->sensors.size() == 1 && !reads_motion_)
+      return add_gradient_of_one(at, scale, y_bar, rho_bar);
     Scratch& s = scratch_of_this_thread();
     set_inputs(at, s, compiled_->slopes_read_sensors);
     for (const int i : compiled_->program.used_inputs()) s.gradient[index(i)] = 0;
@@ -88,6 +91,22 @@ class ExpressionCost : public PointCost {
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
   // A thread's arrays serve any expression. A program gets as many numbers as it has inputs.
   std::span<double> inputs(std::vector<double>& x) const { return {x.data(), index(compiled_->inputs)}; }
+
+  // Evaluates the sensor once, with its gradient, before the slope is known.
+  double add_gradient_of_one(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const {
+    Scratch& s = scratch_of_this_thread();
+    set_inputs(at, s, false);
+    const auto& [input, sensor] = compiled_->sensors.front();
+    s.y_bar.setZero(y_bar.size());
+    s.rho_bar.setZero(rho_bar.size());
+    s.x[index(input)] = mechanism_.add_unfolded_gradient(sensor, at, 1, s.y_bar, s.rho_bar);
+    for (const int i : compiled_->program.used_inputs()) s.gradient[index(i)] = 0;
+    const double value = compiled_->program.add_gradient(inputs(s.x), scale, inputs(s.gradient), s.program);
+    for (const int k : active_) rho_bar(k) += s.gradient[index(k)];
+    const double weight = s.gradient[index(input)];
+    if (weight != 0) y_bar += weight * s.y_bar, rho_bar += weight * s.rho_bar;
+    return value;
+  }
 
   void set_inputs(const StatePoint& at, Scratch& s, bool with_sensors = true) const {
     s.grow(compiled_->program, compiled_->inputs);
