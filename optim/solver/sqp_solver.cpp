@@ -150,7 +150,7 @@ class SqpSearch : private NlpSearch {
   SqpStep damped_by(const SqpModel& model, double lambda) const {
     MatrixXd H = B();
     H.diagonal().array() += lambda;
-    return model.step(H, nu_);
+    return model.step(H, nu_, violations_);
   }
 
   // The step of the least lambda that ends within the radius, or little inside of it.
@@ -213,12 +213,18 @@ class SqpSearch : private NlpSearch {
     const SqpModel model(problem_, x_, point_);
     unbalanced_ = std::isfinite(distance_) ? distance_ : optimality(problem_, x_, point_);
     missed_ = std::numeric_limits<double>::infinity();
+    violations_ = SqpModel::Violations::of_rows;
     while (true) {
       SqpStep step = steered_step(model);
       if (!step.ok) return false;
       const double gain = promised(model, step.d), size = std::abs(merit(point_));
       if (!(gain > kNothing * size) || is_short(step.d)) {
-        if (scaled_violation(problem_, point_) <= kHeld || nu_ >= kLargestPenalty) return false;
+        if (scaled_violation(problem_, point_) <= kHeld) return false;
+        if (violations_ == SqpModel::Violations::of_rows) {
+          violations_ = SqpModel::Violations::of_constraints;
+          continue;
+        }
+        if (nu_ >= kLargestPenalty) return false;
         nu_ *= kHeavier;  // nothing but the violation counts any more
         continue;
       }
@@ -378,6 +384,7 @@ class SqpSearch : private NlpSearch {
   double unbalanced_ = 0;       // optimality of the point, feasible or not
   double missed_ = 0;           // by the promise of the last step
   int jumps_ = 0;
+  SqpModel::Violations violations_ = SqpModel::Violations::of_rows;
   double lambda_ = 1e-3, radius_, nu_ = kFirstPenalty, distance_ = std::numeric_limits<double>::infinity();
   MatrixXd given_, learnt_, bfgs_;  // given: empty where it is not known or no help
   int useless_ = 0;                 // given ones in a row

@@ -35,7 +35,7 @@ double sum_of_worst(const std::vector<SqpRow>& rows, const std::vector<double>& 
 // The dual problem of a step, over the rows that have joined.
 class Dual {
  public:
-  Dual(const SqpModel& model, const MatrixXd& L, double nu)
+  Dual(const SqpModel& model, const MatrixXd& L, double nu, SqpModel::Violations violations)
       : model_(model),
         L_(L),
         nu_(nu),
@@ -43,8 +43,12 @@ class Dual {
         m_(static_cast<Index>(model.rows.size())),
         r_(L.triangularView<Eigen::Lower>().solve(model.g)),
         is_taken_(static_cast<std::size_t>(m_ + 2 * n_), false) {
-    for (const SqpRow& row : model.rows)
+    std::map<Index, int> rows;
+    for (const SqpRow& row : model.rows) {
       if (row.row < 0) extremes_.emplace(row.row, static_cast<Index>(extremes_.size()));
+      if (violations == SqpModel::Violations::of_constraints && row.row >= 0 && ++rows[row.row] == 2)
+        shared_.emplace(row.row, static_cast<Index>(shared_.size()));
+    }
   }
 
   SqpStep solve() {
@@ -86,14 +90,18 @@ class Dual {
     constexpr double kGivesWay = 1e-10;            // delta: scaled multipliers are about 1, limits hold to 1e-8
     constexpr double kCurvatureOfExtremes = 1e-3;  // tau: the multipliers of pieces sum up to 1 - tau t
     const double root = std::sqrt(kGivesWay / std::max(1.0, nu_)), weight = 1 / std::sqrt(kCurvatureOfExtremes);
-    const Index columns = static_cast<Index>(taken_.size()), extremes = static_cast<Index>(extremes_.size());
+    const Index columns = static_cast<Index>(taken_.size()), extremes = static_cast<Index>(extremes_.size()),
+                shared = static_cast<Index>(shared_.size()), sums = n_ + extremes, own = sums + shared;
     y_.assign(taken_.size(), 0);
     LA_.resize(n_, columns);
     if (columns == 0) return;
-    MatrixXd M = MatrixXd::Zero(n_ + extremes + columns, columns);
-    VectorXd b = VectorXd::Zero(M.rows()), least(columns), most(columns);
+    MatrixXd M = MatrixXd::Zero(own + columns, columns + shared);
+    VectorXd b = VectorXd::Zero(M.rows()), least = VectorXd::Zero(M.cols()),
+             most = VectorXd::Constant(M.cols(), kInfinity);
     b.head(n_) = -r_;
     b.segment(n_, extremes).setConstant(weight);
+    b.segment(sums, shared).setConstant(weight * nu_);
+    M.block(sums, columns, shared, shared).diagonal().setConstant(weight);  // what the multipliers leave of nu
     for (Index c = 0; c < columns; ++c) {
       const Index j = taken_[static_cast<std::size_t>(c)];
       const Column of = column(j);
@@ -102,10 +110,11 @@ class Dual {
       LA_.col(c) = L_.triangularView<Eigen::Lower>().solve(of.a);
       M.col(c).head(n_) = LA_.col(c);
       if (j < m_ && row_at(j).row < 0) M(n_ + extremes_.at(row_at(j).row), c) = weight;
-      M(n_ + extremes + c, c) = root;
-      b(n_ + extremes + c) = -of.u / root;
+      if (j < m_ && shared_.contains(row_at(j).row)) M(sums + shared_.at(row_at(j).row), c) = weight;
+      M(own + c, c) = root;
+      b(own + c) = -of.u / root;
     }
-    const VectorXd y = bounded_linear_least_squares(M, b, least, most);
+    const VectorXd y = bounded_linear_least_squares(M, b, least, most).head(columns);
     y_.assign(y.begin(), y.end());
   }
 
@@ -154,6 +163,7 @@ class Dual {
   const Index n_, m_;
   const VectorXd r_;                 // L^-1 g
   std::map<Index, Index> extremes_;  // in f: their numbers by NlpPiece::row
+  std::map<Index, Index> shared_;    // constraints of several rows: their numbers
   std::vector<bool> is_taken_;
   std::vector<Index> taken_;
   std::vector<double> y_;  // of the columns taken
@@ -240,10 +250,10 @@ void SqpModel::correct(const NonlinearProgram& problem, const VectorXd& d, const
   }
 }
 
-SqpStep SqpModel::step(const MatrixXd& H, double nu) const {
+SqpStep SqpModel::step(const MatrixXd& H, double nu, Violations violations) const {
   const MatrixXd L = cholesky_factor(H);
   if (L.size() == 0) return {};
-  return Dual(*this, L, nu).solve();
+  return Dual(*this, L, nu, violations).solve();
 }
 
 }  // namespace mbsopt::inline optim

@@ -1,14 +1,17 @@
 // The step of sequential quadratic programming, from the values and derivatives at a point:
 //
-//   minimise over d, t   g'd + 1/2 d'H d + sum of t_k + 1/2 tau |t|^2 + nu * sum of the violations of  a_i'd <= u_i
-//   subject to           p_k,j + p_k,j,x'd <= t_k,   x_lower <= x + d <= x_upper
+//   minimise over d, t, s   g'd + 1/2 d'H d + sum of t_k + 1/2 tau |t|^2 + nu * sum of s_i + 1/2 tau |s|^2
+//   subject to              p_k,j + p_k,j,x'd <= t_k,   a_i,j'd - u_i,j <= s_i,   x_lower <= x + d <= x_upper
 //
-// The rows are those of all constraints; f may contain extremes k of pieces p_k,j (NlpPiece). A violation costs nu, so
-// that a step exists even if the linear constraints contradict each other. The dual problem has simple bounds only:
+// f may contain extremes k of pieces p_k,j (NlpPiece). Constraint i has one row j, or one for each of its pieces. Its
+// largest violation s_i >= 0 costs nu, so that a step exists even if the linear constraints contradict each other.
+// Alternatively each row has a violation of its own: such steps come farther into what limits allow, unless pieces of
+// one limit contradict each other. The dual problem has simple bounds only:
 //
 //   minimise over y   1/2 |L^-1 (g + A'y)|^2 + u'y + delta/2 |y|^2,    0 <= y <= nu,    H = L L'
 //
-// and is a linear least-squares problem within bounds. Rows join when the step before broke them: most never do.
+// with 1/tau times the square of what the multipliers of an extreme differ from 1, or those of a constraint exceed nu,
+// added. It is a linear least-squares problem within bounds. Rows join when the step before broke them: most never do.
 // delta lets a row give way by delta y, less than any tolerance; so dependent rows do no harm.
 #pragma once
 
@@ -39,7 +42,8 @@ struct SqpStep {
 struct SqpModel {
   SqpModel(const NonlinearProgram& problem, const Eigen::VectorXd& x, const NlpPoint& point);
 
-  SqpStep step(const Eigen::MatrixXd& H, double nu) const;
+  enum class Violations { of_rows, of_constraints };
+  SqpStep step(const Eigen::MatrixXd& H, double nu, Violations violations) const;
   double objective(const Eigen::VectorXd& d) const;  // its change, linear
   double violation(const Eigen::VectorXd& d) const;  // sum over the constraints, linear
   // Moves the constraints by what their values at x + d differ from the linear ones: a second-order correction.

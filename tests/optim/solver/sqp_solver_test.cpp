@@ -173,6 +173,19 @@ TEST_CASE("sqp says that limits exclude each other, at the point that violates t
   CHECK(result.x(0) == Approx(1).epsilon(1e-3));
 }
 
+// Right of the start one piece falls less than the other rises, though the larger one falls: to 1.5 at x = 3.5.
+TEST_CASE("sqp lowers the largest of pieces that contradict each other", "[sqp]") {
+  Written program(
+      1, {[](const auto& x) { return x(0); }}, {},
+      {{[](const auto& x) { return 5 - x(0); }, [](const auto& x) { return 3 + 1.5 * x(0) - x(0) * x(0); }}});
+  program.x_lower(0) = 0, program.x_upper(0) = 10;
+  program.c_upper(0) = 1.5;
+  const NlpResult result = solve_with_sqp(program, vector({0.0}), {});
+  INFO(result.message);
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(result.x(0) == Approx(3.5).epsilon(1e-8));
+}
+
 TEST_CASE("sqp goes round a point that cannot be evaluated, and ends on request", "[sqp]") {
   struct Fragile : NonlinearProgram {
     Fragile() : NonlinearProgram(1, 0) {}
