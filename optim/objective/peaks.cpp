@@ -13,14 +13,14 @@
 
 namespace mbsopt::inline optim {
 
-PeakWatch::PeakWatch(std::vector<Watched> watched, const SimulationSettings& settings)
-    : rows_(output_times(settings)), max_step_(settings.integrator.max_step.value_or(INFINITY)) {
+PeakWatch::PeakWatch(std::vector<Watched> watched, const SimulationSettings& settings, std::vector<double> further)
+    : further_(std::move(further)), max_step_(settings.integrator.max_step.value_or(INFINITY)) {
   for (Watched& of : watched) curves_.push_back({std::move(of)});
 }
 
 Sampling PeakWatch::sampling() {
   for (Curve& curve : curves_) curve = {curve.of};
-  next_row_ = 0;
+  next_ = 0;
   return {{}, {}, [this](const StepInside& step) { look(step); }};
 }
 
@@ -50,7 +50,6 @@ void PeakWatch::look(const StepInside& step) {
   for (Curve& curve : curves_) find_tops(curve, step);
 }
 
-// No row of a trajectory exceeds a true extreme.
 void PeakWatch::set_times(const StepInside& step) {
   constexpr double kParts = 8;
   constexpr double kSame = 1e-6;  // of the step: values so near to each other differ by rounding only
@@ -62,8 +61,8 @@ void PeakWatch::set_times(const StepInside& step) {
     for (double j = 0; j < parts; ++j) times_.push_back(step.t0 + j * h / parts);
     times_.push_back(step.t1);
   }
-  for (; next_row_ < rows_.size() && rows_[next_row_] <= step.t1; ++next_row_)
-    if (rows_[next_row_] > step.t0) times_.push_back(rows_[next_row_]);
+  for (; next_ < further_.size() && further_[next_] <= step.t1; ++next_)
+    if (further_[next_] > step.t0) times_.push_back(further_[next_]);
   std::ranges::sort(times_);
   const auto same = [&](double a, double b) { return b - a <= kSame * h; };
   times_.erase(std::unique(times_.begin(), times_.end(), same), times_.end());
@@ -126,7 +125,7 @@ std::vector<std::vector<Peak>> peaks(const std::vector<Watched>& watched, const 
                                      const SimulationSettings& settings, const StepSequence& steps,
                                      const std::function<bool(double t)>& progress) {
   if (watched.empty()) return {};
-  PeakWatch watch(watched, settings);
+  PeakWatch watch(watched, settings, output_times(settings));
   // CVODES takes its own steps again.
   const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, progress};
   if (!simulate(mechanism, settings, {}, watch.sampling(), options).ok()) return {};

@@ -1,7 +1,7 @@
 // The largest or least values of expressions over a run, with the local ones beside them.
 //
-// A watch looks into each step: at eight instants of an integrated one, at the nodes of a solved one, and at the times
-// of the rows of a trajectory. Where three neighbours enclose a top, Brent's method finds it ("Algorithms for
+// A watch looks into each step: at eight instants of an integrated one, at the nodes of a solved one, and at further
+// times on request. Where three neighbours enclose a top, Brent's method finds it ("Algorithms for
 // Minimization without Derivatives", 1973, chapter 5), unless it cannot be one of the most extreme.
 //
 //   PeakWatch watch({{1, force}}, settings);
@@ -34,7 +34,8 @@ inline constexpr std::size_t kMostPeaks = 8;
 
 class PeakWatch {
  public:
-  PeakWatch(std::vector<Watched> watched, const SimulationSettings& settings);
+  // further: ascending times at which it also looks
+  PeakWatch(std::vector<Watched> watched, const SimulationSettings& settings, std::vector<double> further = {});
 
   // Returns what the run to watch is given. The watch begins anew, and must outlive the run.
   Sampling sampling();
@@ -57,13 +58,14 @@ class PeakWatch {
   static void refine(Curve& curve, const Peak& left, const Peak& top, const Peak& right, const StepInside& step);
 
   std::vector<Curve> curves_;
-  const std::vector<double> rows_;  // the times of the rows of a trajectory
+  const std::vector<double> further_;
   const double max_step_;
-  std::size_t next_row_ = 0;
+  std::size_t next_ = 0;       // of the further times
   std::vector<double> times_;  // in the present step
 };
 
-// The same of a run on given steps. Nothing if it fails, or if progress, called after steps as in RunOptions, stops it.
+// The same of a run on given steps, also at the times of the rows of its trajectory, so that no row exceeds an extreme.
+// Nothing if it fails, or if progress, called after steps as in RunOptions, stops it.
 std::vector<std::vector<Peak>> peaks(const std::vector<Watched>& watched, const Mechanism& mechanism,
                                      const SimulationSettings& settings, const StepSequence& steps,
                                      const std::function<bool(double t)>& progress = {});
