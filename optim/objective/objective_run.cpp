@@ -83,6 +83,18 @@ std::vector<Cost> together(std::span<const Cost> costs, const std::vector<Cost>&
   return all;
 }
 
+// A part of a cost.
+struct Share final : PointCost {
+  Share(std::shared_ptr<const PointCost> of, double part) : x(std::move(of)), factor(part) {}
+  double value(const StatePoint& at) const override { return factor * x->value(at); }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    return factor * x->add_gradient(at, factor * scale, y_bar, rho_bar);
+  }
+  bool reads_positions() const override { return x->reads_positions(); }
+  std::shared_ptr<const PointCost> x;
+  double factor;
+};
+
 // The pieces of one side. values: of each peak, from `first` on, which goes on to the next side.
 std::vector<ExtremePiece> pieces_of(const ObjectiveMean& side, const std::vector<Peak>& peaks, const VectorXd& values,
                                     const MatrixXd& values_rho, Index& first) {
@@ -90,7 +102,8 @@ std::vector<ExtremePiece> pieces_of(const ObjectiveMean& side, const std::vector
   const double factor = side.part.factor;
   std::vector<ExtremePiece> found;
   for (const Peak& peak : peaks) {
-    found.push_back({side.row, static_cast<int>(sign * factor), factor * values(first),
+    const double value = peak.apart > 0 ? peak.value : values(first);
+    found.push_back({side.row, static_cast<int>(sign * factor), factor * value,
                      factor * values_rho.row(first).transpose(), peak.t});
     ++first;
   }
@@ -187,7 +200,12 @@ bool ExtremeRun::differentiate(const Mechanism& mechanism, bool backward, const 
     for (const Peak& peak : peaks_[k]) {
       Cost& cost = tops.emplace_back();
       cost.name = sides_[k].objective->name();
-      cost.samples.push_back({peak.t, x});
+      if (peak.apart == 0) {
+        cost.samples.push_back({peak.t, x});
+        continue;
+      }
+      cost.samples.push_back({peak.t - peak.apart, std::make_shared<Share>(x, 1 - peak.behind)});
+      cost.samples.push_back({peak.t + peak.apart, std::make_shared<Share>(x, peak.behind)});
     }
   }
   VectorXd values;  // of the tops

@@ -41,12 +41,12 @@ struct ExtremePiece {
   Eigen::Index row = 0;  // of psi
   int side = 1;          // -1: of the least
   double value = 0;
-  Eigen::VectorXd gradient;  // per variable; the instant does not move it, as it is stationary
+  Eigen::VectorXd gradient;  // per variable; the instant does not move it, as it is stationary or at a kink (peaks.hpp)
   double t = 0;              // [s]; of two, a sum that tells pairs apart
 };
 
 // One evaluation with true extremes. A run finds the steps, the other objectives and the peaks (peaks.hpp). Derivatives
-// are those of a sweep on the same steps, in which each peak is a sample at its instant.
+// are those of a sweep on the same steps, in which each peak is a sample at its instant, or at a kink two beside it.
 //
 //   ExtremeRun run(objectives, settings, options);
 //   if (run.find(mechanism_without_derivatives)) run.differentiate(mechanism, false, variables);

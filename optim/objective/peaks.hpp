@@ -27,6 +27,10 @@ struct Watched {
 
 struct Peak {
   double t = 0, value = 0;
+  // Of a peak at a kink: the distance of instants that are on one side of it [s], 0 elsewhere. Where x rises by a per
+  // second before it and falls by b behind it, these branches meet at a value with the derivative
+  //   (b x_rho(t - apart) + a x_rho(t + apart))/(a + b),    behind = a/(a + b)
+  double apart = 0, behind = 0;
 };
 
 // At most this many of one expression: those of the most extreme values.
@@ -49,6 +53,7 @@ class PeakWatch {
     std::vector<Peak> best = {};    // of side * x, the highest first
     Peak last{0, -INFINITY};        // point so far; none was finite
     bool rose = true;               // to it: it is a top if the value falls from there
+    double slope = 0;               // with which it rose, where that is no smooth top
     double value(const StatePoint& at) const { return of.side * of.x->value(at); }
     void add(const Peak& peak);
   };
@@ -56,6 +61,8 @@ class PeakWatch {
   void set_times(const StepInside& step);
   static void find_tops(Curve& curve, const StepInside& step);
   static void refine(Curve& curve, const Peak& left, const Peak& top, const Peak& right, const StepInside& step);
+  static Peak at_kink(const Curve& curve, Peak top, double d, const StepInside& step);
+  static double fall(const Curve& curve, const Peak& top, const Peak& beside, const StepInside& step);
 
   std::vector<Curve> curves_;
   const std::vector<double> further_;

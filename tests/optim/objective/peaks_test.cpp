@@ -114,3 +114,38 @@ TEST_CASE("other objectives do not change beside true extremes", "[peaks]") {
   CHECK(b.pieces.empty());
   CHECK(b.psi(0) < a.psi(0));  // the smooth maximum is below
 }
+
+// The largest of min(2 (t - 0.4) + x, 0.9 - t) is where both are the same: 3 t = 1.7 - x(t), with x = a cos(w t). The
+// instant follows the parameters: (3 - a w sin) dt = -cos da + a t sin dw.
+TEST_CASE("the derivative of a peak at a kink follows the kink", "[peaks]") {
+  const bool solved = GENERATE(true, false);
+  const double a = 0.2, w = 2;
+  Scene s;
+  if (solved) {
+    s = pushed_cart("0", 1.5, 1e-10);
+    add_parameters(s, {{"a", a}, {"k", w * w}});
+    Drive drive;
+    drive.name = "motor", drive.type = "displacement", drive.joint = "slide", drive.law = f("a*cos(sqrt(k)*t)");
+    s.forces.clear();
+    s.drives.push_back(drive);
+    s.sensors.push_back(point_sensor("x", "position", "cart", vec("0", "0", "0"), "x"));
+  } else {
+    s = swinging_mass({{"a", a}, {"k", w * w}}, "-k*x", 1.5, 1e-11);
+  }
+  ObjectiveSpec spec;
+  spec.name = "peak", spec.mean("maximum_of") = f("min(2*(t - 0.4) + x, 0.9 - t)");
+  std::vector<Objective> objectives;
+  objectives.emplace_back(s, spec);
+  EvaluatorOptions options;
+  options.method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint);
+  options.true_extremes = true;
+  Evaluator evaluator(std::move(s), std::move(objectives), {"a", "k"}, options);
+  double t = 0.5;
+  for (int i = 0; i < 20; ++i) t -= (3 * t - 1.7 + a * std::cos(w * t)) / (3 - a * w * std::sin(w * t));
+  const double slope = 3 - a * w * std::sin(w * t);
+  const Evaluation e = evaluator.gradients(evaluator.start());
+  REQUIRE(e.ok);
+  CHECK(e.psi(0) == Approx(0.9 - t).epsilon(1e-9));
+  CHECK(e.psi_rho(0, 0) == Approx(std::cos(w * t) / slope).epsilon(1e-6));
+  CHECK(e.psi_rho(0, 1) == Approx(-a * t * std::sin(w * t) / slope / (2 * w)).epsilon(1e-6));
+}
