@@ -140,8 +140,9 @@ void NlpSearch::conclude(const std::string& why) {
                            result_.failures());
   const double distance = optimality(problem_, result_.x, result_.point);
   if (distance <= tolerance_)
-    return result_.end(SolverStatus::converged, result_.evaluations == 1 ? "converged: the start is optimal already"
-                                                                         : "converged: the optimality conditions hold");
+    return result_.end(SolverStatus::converged, result_.evaluations == 1
+                                                    ? "converged: the optimality conditions hold where the search began"
+                                                    : "converged: the optimality conditions hold");
   if (distance <= kAcceptable * tolerance_)
     return result_.end(SolverStatus::converged,
                        "converged: the objective does not change any more, and the optimality conditions hold to the "
