@@ -36,6 +36,7 @@ Scene chain(int rods, int parameters) {
     Parameter p;
     p.name = fmt::format("{}{}", k < masses ? 'm' : 'l', k < masses ? k : k - masses);
     p.value = k < masses ? 0.3 : 0.2;
+    p.allow_unused = true;  // the length of the last rod
     scene.parameters.push_back(p);
   }
   for (int i = 0; i < rods; ++i) {
