@@ -53,7 +53,7 @@ struct RowWeights {
 };
 // The cotangent of x in it for phi = x'y.
 template <class V>
-MovedJet<V> product_bar(const MovedJet<V>& y, const RowWeights& z) {
+EIGEN_ALWAYS_INLINE MovedJet<V> product_bar(const MovedJet<V>& y, const RowWeights& z) {
   return {{V(z.lambda * y.x_eta + z.mu0 * y.x + z.mu1 * y.xd + z.mu2 * y.xdd), V(z.mu1 * y.x + (2 * z.mu2) * y.xd),
            V(z.mu2 * y.x)},
           V(z.lambda * y.x)};
