@@ -141,10 +141,15 @@ class JsonParser {
     return path;
   }
 
-  // nlohmann's parser decides what a string, a number or a literal is.
+  // nlohmann's parser decides what a string, a number or a literal is. Strings without escapes need none.
   nlohmann::json read_scalar() {
     if (at_ == text_.size()) expected("a value");
     const std::string_view word = token();
+    const auto is_plain = [](char c) { return c != '\\' && static_cast<unsigned char>(c) >= 0x20; };
+    if (word.size() > 1 && word.front() == '"' && word.back() == '"' && std::ranges::all_of(word, is_plain)) {
+      at_ += word.size();
+      return std::string(word.substr(1, word.size() - 2));
+    }
     nlohmann::json scalar = nlohmann::json::parse(word, nullptr, false);
     if (scalar.is_discarded()) {
       double number = 0;
