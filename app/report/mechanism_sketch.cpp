@@ -19,9 +19,8 @@ using Eigen::Vector3d;
 
 SketchPoint point_by_facts(const SceneFacts& facts, const std::string& body, const PointField& field) {
   const auto s = facts.value(field, body);
-  const auto& bodies = facts.scene().bodies;
-  const auto found = std::ranges::find(bodies, body, &Body::name);
-  return {found == bodies.end() ? kGround : static_cast<std::size_t>(found - bodies.begin()),
+  const Body* const found = facts.body(body);
+  return {found ? static_cast<std::size_t>(found - facts.scene().bodies.data()) : kGround,
           s ? Vector3d((*s)[0], (*s)[1], (*s)[2]) : Vector3d(Vector3d::Zero())};
 }
 
