@@ -100,7 +100,7 @@ Json reactions_json(const MovingState& state) {
                       {"force", json_list(std::array{k, k + 1, k + 2},
                                           [&](std::size_t column_of) { return rounded(column(forces, column_of)); })}});
   }
-  return {{"t", rounded(column(forces, 0), kTimeDigits)}, {"large", rounded(large)}, {"joints", joints}};
+  return {{"t", rounded(column(forces, 0), kTimeDigits)}, {"large", rounded(large)}, {"joints", std::move(joints)}};
 }
 
 Json points_json(std::vector<Eigen::Vector3d> points) {
@@ -122,7 +122,7 @@ Json state_json(const MovingState& state, std::size_t most) {
                       {"points", points_json(body.points)},
                       {"hulls", json_list(body.hulls, points_json)},
                       {"solid", body.solid},
-                      {"pose", pose}});
+                      {"pose", std::move(pose)}});
   }
   const auto optional_point = [](const std::optional<SketchPoint>& p) { return p ? point_json(*p) : Json(); };
   const auto mark_json = [&](const SketchedMark& mark) {
@@ -140,7 +140,7 @@ Json state_json(const MovingState& state, std::size_t most) {
   return {{"name", state.name},
           {"ghost", state.ghost},
           {"t", rounded(column(shown, 0), kTimeDigits)},
-          {"bodies", bodies},
+          {"bodies", std::move(bodies)},
           {"marks", json_list(sketch.marks, mark_json)},
           {"traces", json_list(sketch.traces, trace_json)},
           {"targets", json_list(state.targets, target_json)},
