@@ -268,10 +268,12 @@ std::set<std::string> used_anywhere(Problem problem, bool with_laws) {
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem, bool whole) {
   std::vector<SceneIssue> issues;
   std::set<std::string> used = used_in(problem, whole);
-  const std::set<std::string> without_cases = Reach(problem, whole).parameters();
-  for (const CaseSpec& load_case : problem.cases)  // a value that every load case replaces has its use in none
-    for (const Definition& override : load_case.overrides)
-      if (without_cases.contains(override.name)) used.insert(override.name);
+  if (!problem.cases.empty()) {
+    const std::set<std::string> without_cases = Reach(problem, whole).parameters();
+    for (const CaseSpec& load_case : problem.cases)  // a value that every load case replaces has its use in none
+      for (const Definition& override : load_case.overrides)
+        if (without_cases.contains(override.name)) used.insert(override.name);
+  }
   std::vector<const Parameter*> unused;
   for (const Parameter& parameter : problem.scene.parameters)
     if (!parameter.allow_unused && !used.contains(parameter.name)) unused.push_back(&parameter);
