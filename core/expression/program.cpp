@@ -48,7 +48,7 @@ Program::Scratch Program::scratch() const {
 
 void Program::grow(Scratch& scratch) const {
   const auto grow = [&](auto& array) {
-    if (array.size() < code_.size()) array.resize(code_.size());
+    if (const std::size_t room = std::max(room_, code_.size()); array.size() < room) array.resize(room);
   };
   grow(scratch.value);
   grow(scratch.adjoint);

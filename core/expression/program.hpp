@@ -114,6 +114,7 @@ class Program {
   template <class T, class Add>
   void sweep_back(double scale, const std::vector<T>& value, std::vector<T>& adjoint, Add&& add) const;
   std::vector<Instruction> code_;
+  std::size_t room_ = 0;  // in a scratch at least: with other branches it has as many instructions
   std::vector<int> used_inputs_;
   std::vector<CurveUse> curves_;
 };

@@ -53,6 +53,7 @@ void ProgramBuilder::build_part(const Program& of, int a, Operation how, int b, 
   const int first = at[static_cast<std::size_t>(a)];
   keep_only_what_reaches(how == Operation::cos        ? operation(how, first, -1)
                          : how == Operation::divide   ? operation(how, number(1), first)
+                         : how == Operation::negate   ? negative(first)
                          : how == Operation::subtract ? operation(how, first, at[static_cast<std::size_t>(b)])
                          : how == Operation::number   ? operation(Operation::subtract, first, number(from))
                                                       : first);

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "core/expression/branches.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/expression/program.hpp"
 #include "core/expression/syntax_tree.hpp"
@@ -28,8 +29,12 @@ class ProgramBuilder {
   void build_derivative(const Program& of, int input);
 
   // The value of an instruction of another program, or what `how` makes of it and of a second one: its cosine (cos),
-  // its reciprocal (divide), their difference (subtract), or its distance from a number (number).
+  // its reciprocal (divide), its negative (negate), their difference (subtract), or its distance from a number
+  // (number).
   void build_part(const Program& of, int a, Operation how = Operation::name, int b = -1, double from = 0);
+
+  // Another program with branches held (branches.hpp).
+  void build_with_branches(const Program& of, std::span<const Branching> branchings, std::span<const int> sides);
 
  private:
   using Instruction = Program::Instruction;
@@ -199,6 +204,15 @@ class ProgramBuilder {
   std::vector<Instruction>& code() { return program_.code_; }
   bool is_number(int i) { return code()[static_cast<std::size_t>(i)].operation == Operation::number; }
   double constant(int i) { return code()[static_cast<std::size_t>(i)].constant; }
+  // -(a - b) is b - a, and -(-a) is a.
+  int negative(int i) {
+    const Instruction in = code()[static_cast<std::size_t>(i)];
+    if (in.operation == Operation::negate) return in.a;
+    if (in.operation == Operation::subtract) return operation(Operation::subtract, in.b, in.a);
+    return operation(Operation::negate, i, -1);
+  }
+  int quotient_without(int a, int b);
+  int piece(const Program::CurveUse& use, int argument, std::span<const Branching> samples, std::span<const int> sides);
   bool is(int i, double value) { return is_number(i) && constant(i) == value; }
 
   const Symbols& symbols_;

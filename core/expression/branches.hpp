@@ -1,0 +1,37 @@
+// The branches of a program. At abs, sign, min, max, and at samples of tables of the motion, a program takes one of two
+// branches, by the sign of a decision: a of abs(a), a - b of max(a, b). Each branch alone is smooth.
+//
+//   const std::vector<Branching> branchings = branchings_of(law, parameters, time);
+//   const Program beyond = with_branches(law, branchings, {1});    // of max(x - gap, 0): x - gap, for any x
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "core/expression/program.hpp"
+
+namespace mbsopt {
+
+struct Branching {
+  std::size_t instruction = 0;
+  double sample = 0;  // of a table
+  Program decision;   // its inputs are those of the program
+  int sign = 1;       // 1, or -1 where the branch follows the opposite sign
+  // The exponent of a power or root that reads the branch and has no values on its other side; if it is below 2, its
+  // second derivative is infinite there. `rises` is the side of the decision on which it varies; 0: on both.
+  double root = INFINITY;
+  int rises = 0;
+};
+
+// The branchings whose decision depends on an input from `parameters` on. Tables of time alone are left out
+// (kink_times.hpp), and so are those with many samples, which follow smooth functions.
+std::vector<Branching> branchings_of(const Program& program, int parameters, int time);
+
+// The same program with a side, 1 or -1, of each branching's decision; with side 0 it stays as written. It has at most
+// as many instructions. A branch that a root or a power reads has no values on its other side and stays as written.
+Program with_branches(const Program& program, std::span<const Branching> branchings, std::span<const int> sides);
+
+Program negative_of(const Program& program);
+
+}  // namespace mbsopt
