@@ -16,6 +16,7 @@ inline double branch(const Eigen::VectorXd& angles, int angle) {
 // A force: its kind in the list `Forces` (forces.hpp), its index among those of this kind.
 struct ForcePlace {
   std::size_t kind = 0, index = 0;
+  bool operator==(const ForcePlace&) const = default;
 };
 
 struct ForceInputs {

@@ -24,8 +24,10 @@ namespace mbsopt {
 
 extern template struct JointEffort<Angle, FrictionLaw>;
 extern template struct JointEffort<Dot2, FrictionLaw>;
+extern template struct JointEffort<Dot2, Law>;
 using TurningFriction = JointEffort<Angle, FrictionLaw>;
 using SlidingFriction = JointEffort<Dot2, FrictionLaw>;
+using SlidingForce = JointEffort<Dot2, Law>;  // of stops along an axis, and of planes
 
 template <class Kind>
 concept HasLaw = std::same_as<decltype(Kind::law), Law>;
@@ -71,20 +73,29 @@ class ForceLists {
   // Calls visitor(force) if its kind has a law.
   template <class Visitor>
   void visit_law(ForcePlace place, Visitor&& visitor) const {
+    visit_law_in(lists_, place, visitor);
+  }
+  template <class Visitor>
+  void change_law(ForcePlace place, Visitor&& visitor) {
+    visit_law_in(lists_, place, visitor);
+  }
+
+ private:
+  template <class Lists, class Visitor>
+  static void visit_law_in(Lists& lists, ForcePlace place, Visitor&& visitor) {
     std::size_t kind = 0;
-    const auto visit = [&](const auto& list) {
+    const auto visit = [&](auto& list) {
       if constexpr (HasLaw<typename std::decay_t<decltype(list)>::value_type>) {
         if (kind == place.kind) visitor(list[place.index]);
       }
       ++kind;
     };
-    std::apply([&](const auto&... list) { (visit(list), ...); }, lists_);
+    std::apply([&](auto&... list) { (visit(list), ...); }, lists);
   }
 
- private:
   std::tuple<std::vector<Kinds>...> lists_;
 };
 
-struct Forces : ForceLists<TsdaForce, RsdaForce, TurningFriction, SlidingFriction, Bushing> {};
+struct Forces : ForceLists<TsdaForce, RsdaForce, TurningFriction, SlidingFriction, SlidingForce, Bushing> {};
 
 }  // namespace mbsopt

@@ -97,5 +97,6 @@ void JointEffort<P, L>::pull_back_potential(const Eigen::VectorXd& angles, const
 template struct JointEffort<Angle, Law>;
 template struct JointEffort<Angle, FrictionLaw>;
 template struct JointEffort<Dot2, FrictionLaw>;
+template struct JointEffort<Dot2, Law>;
 
 }  // namespace mbsopt

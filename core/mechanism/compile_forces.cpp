@@ -173,6 +173,59 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
   }
 }
 
+// k d^n (1 + a ddot), never negative, where d > 0. The input of the law and its rate have names that no file uses.
+constexpr std::array<const char*, 2> kWay = {"way__", "rate__"};
+
+std::string one_sided(const OneSided& f, const std::string& depth, const std::string& rate) {
+  std::string force = "(" + f.stiffness.text() + ")*max(" + depth + ",0)";
+  if (!f.exponent.is_number() || f.exponent.number() != 1) force += "^(" + f.exponent.text() + ")";
+  if (f.damping.is_number() && f.damping.number() == 0) return force;
+  return force + "*max(1+(" + f.damping.text() + ")*" + rate + ",0)";
+}
+
+void add(Compilation& model, const StopSpec& f, int force, const std::string& where) {
+  std::string resistance = "0";
+  if (f.upper) resistance += "+" + one_sided(f, "way__-(" + f.upper->text() + ")", "rate__");
+  if (f.lower) resistance += "-" + one_sided(f, "(" + f.lower->text() + ")-way__", "(-rate__)");
+  Law resists = law(model, Expression::parse(resistance), kWay, {}, where);
+  const Joint& joint = model.scene.joints[model.joint_index(f.joint, where + ".joint")];
+  if (is_sliding(f.motion, joint.type)) {
+    model.data.forces->of<SlidingForce>().push_back(
+        {force, model.joint_displacement(f.joint, where + ".joint"), -1, std::move(resists)});
+  } else {
+    const int angle = model.angle_of(f.joint, where + ".joint");
+    model.data.forces->of<RsdaForce>().push_back(
+        {force, model.data.angles[static_cast<std::size_t>(angle)], angle, std::move(resists)});
+  }
+}
+
+// The way is the height over a plane, or the distance of the centres, along which the force acts.
+void add(Compilation& model, const ContactSpec& f, int force, const std::string& where) {
+  const int body1 = model.body_index(f.body1, where + ".body1"), body2 = model.body_index(f.body2, where + ".body2");
+  const FieldVector3 point1 = model.point(body1, f.point1, where + ".point1"),
+                     point2 = model.point(body2, f.point2, where + ".point2");
+  const std::string radius2 = "(" + f.radius2.text() + ")", radius1 = f.radius1 ? "(" + f.radius1->text() + ")" : "0";
+  const std::string pushes = f.inside ? one_sided(f, "way__-" + radius1 + "+" + radius2, "rate__")
+                                      : "-" + one_sided(f, radius1 + "+" + radius2 + "-way__", "(-rate__)");
+  Law resists = law(model, Expression::parse(pushes), kWay, {}, where);
+  if (f.normal1) {
+    SlidingForce out{force, {{body1, body2}, {}}, -1, std::move(resists)};
+    out.joint.measure.s1 = numbers(model.keep(out.joint.slot1, point1));
+    out.joint.measure.s2 = numbers(model.keep(out.joint.slot2, point2));
+    out.joint.measure.s3 = numbers(model.keep(out.joint.slot3, model.direction(body1, f.normal1, where + ".normal1")));
+    model.data.forces->of<SlidingForce>().push_back(std::move(out));
+  } else {
+    TsdaForce out;
+    out.force = force;
+    out.body1 = body1;
+    out.body2 = body2;
+    out.s1 = numbers(model.keep(out.slot1, point1));
+    out.s2 = numbers(model.keep(out.slot2, point2));
+    out.law = std::move(resists);
+    model.data.forces->of<TsdaForce>().push_back(std::move(out));
+  }
+}
+
 // where is the force's place in the scene, or "user force". name is its own name, for messages.
 void add_user_force(Compilation& model, std::shared_ptr<const UserForce> force, std::vector<std::string> bodies,
                     std::optional<TermValues> values, const std::string& where, std::string name) {

@@ -3,6 +3,7 @@
 //   f(x, xdot, t, rho),   x = l or the joint's angle
 //   f_y = f_x x_y + f_xdot xdot_y          f_rho = the law's own + through the geometry
 #include "core/force/forces.hpp"
+#include "core/mechanism/program_sensors.hpp"
 #include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 
@@ -22,26 +23,29 @@ Law::Scratch& scratch_of_this_thread(const MechanismData& data, const Law& law) 
 
 // Adds the gradient through the law's own coefficients, or through the parameters of its expression.
 void add_law_gradient(const Law& law, double x, double xdot, const Law::Scratch& scratch, SensorGradient& to) {
+  if (to.t_bar && law.program) *to.t_bar += to.scale * scratch.gradient.back();
   if (!law.program) return to.add_slot<4>(law.slot, law.field_gradient(x, xdot));
   for (const int k : to.data.active) to.rho_bar(k) += to.scale * scratch.gradient[static_cast<std::size_t>(k)];
 }
 
 struct TensionFunction final : SensorFunction {
   ForcePlace place;
+  std::optional<Law> instead;  // of the force's own law
 
   double evaluate(const MechanismData& d, const StatePoint& at, SensorGradient* to) const override {
     double value = 0;
     d.forces->visit_law(place, [&](const auto& f) {
-      Law::Scratch& scratch = scratch_of_this_thread(d, f.law);
+      const Law& of = instead ? *instead : f.law;
+      Law::Scratch& scratch = scratch_of_this_thread(d, of);
       const auto [i, j] = f.bodies();
       const Frame b1 = body_at(at.y, i), b2 = body_at(at.y, j);
       const auto [x, xdot] = f.measured(at.angles, b1, b2);
       if (!to) {
-        value = f.law.value(at.t, d.rho, x, xdot, scratch);
+        value = of.value(at.t, d.rho, x, xdot, scratch);
         return;
       }
-      const Law::Value law = f.law.derivatives(at.t, d.rho, x, xdot, scratch);
-      add_law_gradient(f.law, x, xdot, scratch, *to);
+      const Law::Value law = of.derivatives(at.t, d.rho, x, xdot, scratch);
+      add_law_gradient(of, x, xdot, scratch, *to);
       FrameBar bar1 = FrameBar::zero(), bar2 = bar1;
       FieldGradient fields = to->fields();
       f.pull_back_measured(b1, b2, law.f_x, law.f_xdot, bar1, bar2, fields);
@@ -54,6 +58,14 @@ struct TensionFunction final : SensorFunction {
 };
 
 }  // namespace
+
+SensorPtr law_sensor(ForcePlace force, Program program) {
+  auto out = std::make_shared<TensionFunction>();
+  out->place = force;
+  out->instead.emplace();
+  out->instead->program = std::move(program);
+  return out;
+}
 
 std::unique_ptr<SensorFunction> make_tension(Compilation& model, const Sensor& s, const std::string& where) {
   const std::vector<Force>& forces = model.scene.forces;
@@ -68,7 +80,7 @@ std::unique_ptr<SensorFunction> make_tension(Compilation& model, const Sensor& s
   });
   if (out) return out;
   throw SceneError(where + ".force: '" + s.force + "' is a " + std::string(type_of(*found)) +
-                   "; only a tsda, an rsda or a torsion_bar has one number to measure");
+                   "; only a tsda, rsda, torsion_bar, stop or contact has one number to measure");
 }
 
 }  // namespace mbsopt

@@ -34,7 +34,9 @@ bool angle_is_used(const Scene& scene, const std::string& joint, const std::stri
   for (const Force& force : scene.forces) {
     const auto* rsda = std::get_if<Rsda>(&force.kind);
     const auto* friction = std::get_if<FrictionSpec>(&force.kind);
+    const auto* stop = std::get_if<StopSpec>(&force.kind);
     if (rsda && rsda->joint == joint) return true;
+    if (stop && stop->joint == joint && !is_sliding(stop->motion, joint_type)) return true;
     if (friction && friction->joint == joint && !is_sliding(friction->motion, joint_type)) return true;
   }
   for (const Sensor& sensor : scene.sensors) {
@@ -365,6 +367,45 @@ void check_kind(Checker& checker, const Applied& f) {
     check_start(checker, child_path(checker.path("components"), i), f.components[i], 0);
 }
 
+void check_one_sided(Checker& checker, const OneSided& f) {
+  const auto check = [&](std::string_view key, const Field& field, double least) {
+    const std::optional<double> value = checker.facts().value(field);
+    if (value && !(*value >= least)) checker.refuse(key, "is {}, it must be at least {}", *value, least);
+  };
+  check("stiffness", f.stiffness, 0);
+  check("exponent", f.exponent, 1);
+  check("damping", f.damping, 0);
+}
+
+void check_kind(Checker& checker, const StopSpec& f) {
+  using namespace dimension;
+  const Joint* const joint = checker.facts().joint(f.joint);
+  const bool slides = joint && is_sliding(f.motion, joint->type);
+  check_joint_has(checker, "joint", f.joint, slides ? "displacement" : "angle");
+  if (joint)
+    for (const auto& [key, bound] : {std::pair{"lower", &f.lower}, {"upper", &f.upper}})
+      if (*bound) checker.number(key, **bound, {"", Need::optional, slides ? kLength : kAngle});
+  if (!f.lower && !f.upper) checker.refuse("", "has neither \"lower\" nor \"upper\"; at least one is needed");
+  check_one_sided(checker, f);
+}
+
+void check_kind(Checker& checker, const ContactSpec& f) {
+  check_two_bodies(checker, f.body1, f.body2, "a contact");
+  direction(checker, "normal1", f.normal1, f.body1);
+  if (f.normal1 && (f.radius1 || f.inside))
+    checker.refuse(f.radius1 ? "radius1" : "inside", "is of a ball or ring, but normal1 makes it a plane");
+  if (!f.normal1 && !f.radius1)
+    checker.refuse("", "has neither \"normal1\" nor \"radius1\"; a plane, ball or ring is needed");
+  const auto radius1 = f.radius1 ? checker.facts().value(*f.radius1) : std::nullopt,
+             radius2 = checker.facts().value(f.radius2);
+  for (const auto& [key, radius] : {std::pair{"radius1", radius1}, {"radius2", radius2}})
+    if (radius && *radius < 0) checker.refuse(key, "is {}, it must not be negative", *radius);
+  if (f.inside && radius1 && radius2 && *radius2 >= *radius1)
+    checker.refuse("radius2", "is {}: a ball inside of the ring must be smaller than its radius1, {}", *radius2,
+                   *radius1);
+  check_one_sided(checker, f);
+}
+
 void check_kind(Checker& checker, const BushingSpec& f) { check_two_bodies(checker, f.body1, f.body2, "a bushing"); }
 
 void check_kind(Checker& checker, const UserForceSpec& f) {
@@ -396,8 +437,8 @@ void check_meaning(Checker& checker, const Sensor& sensor) {
   direction(checker, "axis", sensor.axis, sensor.body1);
   if (sensor.quantity != "force") return;
   const Force* const force = checker.facts().force(sensor.force);
-  if (force && !has_word("tsda rsda torsion_bar", type_of(*force)))
-    checker.refuse("force", "'{}' is a {}; only a tsda, an rsda or a torsion_bar has one number to measure",
+  if (force && !has_word("tsda rsda torsion_bar stop contact", type_of(*force)))
+    checker.refuse("force", "'{}' is a {}; only a tsda, rsda, torsion_bar, stop or contact has one number to measure",
                    sensor.force, type_of(*force));
 }
 

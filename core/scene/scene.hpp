@@ -201,6 +201,25 @@ struct FrictionSpec {
   std::optional<Field> breakaway = {};      // [N m], [N]; empty: coulomb
   std::optional<Field> stribeck_velocity = {};  // [rad/s], [m/s]; with breakaway
 };
+// One-sided springs k d^n (1 + a ddot), never negative, of the depth d.
+struct OneSided {
+  Field stiffness, exponent = 1.0, damping;  // k [N/m^n], n [-], a [s/m]; of an angle [N m/rad^n], [s/rad]
+};
+struct StopSpec : OneSided {  // d: the angle or displacement beyond a bound
+  static constexpr std::string_view kType = "stop";
+  std::string joint;
+  std::string motion;  // as of friction
+  std::optional<Field> lower = {}, upper = {};
+};
+struct ContactSpec : OneSided {
+  static constexpr std::string_view kType = "contact";
+  std::string body1 = "ground", body2;
+  PointField point1 = "O", point2 = "O";
+  std::optional<PointField> normal1 = {};  // out of a plane of body1 through point1; without it, point1 is a centre
+  std::optional<Field> radius1 = {};       // [m]
+  Field radius2;                           // [m]
+  bool inside = false;                     // body2 is inside of the ring of radius1
+};
 // A force written in C++, by its name. Its rho holds its own parameters, in the order of this list.
 struct UserForceSpec {
   static constexpr std::string_view kType = "user";
@@ -211,7 +230,9 @@ struct UserForceSpec {
 };
 struct Force {
   std::string name;
-  std::variant<Tsda, Rsda, TorsionBar, PointForce, Torque, BushingSpec, FrictionSpec, UserForceSpec> kind;
+  std::variant<Tsda, Rsda, TorsionBar, PointForce, Torque, BushingSpec, FrictionSpec, StopSpec, ContactSpec,
+               UserForceSpec>
+      kind;
 };
 
 struct PointOnBody {

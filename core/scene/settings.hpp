@@ -93,6 +93,7 @@ struct SimulationSettings {
   // must still be chosen for it (optim/tradeoff/accuracy.hpp), and nothing can be simulated.
   std::optional<double> accuracy;
   std::vector<double> events;        // times at which a step ends and the next begins [s]
+  bool follows_kinks = true;         // steps end at kinks and jumps of the motion (core/event/)
   double adjoint_memory_mib = 1024;  // limit of the forward motion that an adjoint run keeps [MiB]
 };
 

@@ -56,6 +56,11 @@ constexpr TypeRow kForces[] = {
      "body1 body2! point1 point2 stiffness damping torsional_stiffness torsional_damping"},
     {"friction", "smoothed Coulomb, Stribeck and viscous friction about or along the axis of a joint",
      "joint! motion coulomb smooth_velocity! viscous breakaway stribeck_velocity"},
+    {"stop", "one-sided spring on a joint's angle or displacement beyond a bound: k d^n (1 + a ddot), never negative",
+     "joint! motion lower upper stiffness! exponent damping"},
+    {"contact",
+     "one-sided spring k d^n (1 + a ddot), never negative, between a ball and a plane, a ball, or the inside of a ring",
+     "body1 body2! point1 point2 normal1 radius1 radius2 inside stiffness! exponent damping"},
     {"user", "force written in C++, of a plug-in or of the program, by its name", "force! bodies parameters"},
 };
 

@@ -112,6 +112,7 @@ inline constexpr Choice<double> kAccuracies[] = {{"draft", 1e-3}, {"engineering"
 inline constexpr Choice<Interpolation> kInterpolations[] = {
     {"hold", Interpolation::hold}, {"linear", Interpolation::linear}, {"spline", Interpolation::spline}};
 inline constexpr Choice<double> kTimeZeros[] = {{"first", SampleColumn::kFirstRow}};
+inline constexpr Choice<bool> kKinks[] = {{"locate", true}, {"ignore", false}};
 inline constexpr Choice<bool> kFrames[] = {{"global", false}, {"body", true}};
 
 void describe(auto& v, Like<Parameter> auto& p) {
@@ -335,6 +336,34 @@ void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
            {"rate at which 1/e of breakaway - coulomb is left [rad/s], [m/s]", row["stribeck_velocity"]});
 }
 
+void describe_one_sided(auto& v, auto& f, const TypeRow& row) {
+  v.number("stiffness", f.stiffness, {"k, of the depth d: k d^n (1 + a ddot)", row["stiffness"]});
+  v.number("exponent", f.exponent, {"n: 1 of a spring, 1.5 of two balls (Hertz)", row["exponent"], Dimension{}});
+  v.number("damping", f.damping, {"a, of Hunt and Crossley [s/m], [s/rad]", row["damping"]});
+}
+
+void describe(auto& v, Like<StopSpec> auto& f, const TypeRow& row) {
+  v.reference("joint", f.joint, ElementKind::joint, {"joint it acts in", row["joint"]});
+  v.word("motion", f.motion, Words{"rotation translation"},
+         {"about or along the axis; when absent, about it where the joint has an angle", row["motion"]});
+  v.number("lower", f.lower, {"angle [rad] or displacement [m] below which it acts", row["lower"]});
+  v.number("upper", f.upper, {"the same above which it acts", row["upper"]});
+  describe_one_sided(v, f, row);
+}
+
+void describe(auto& v, Like<ContactSpec> auto& f, const TypeRow& row) {
+  using namespace dimension;
+  v.reference("body1", f.body1, ElementKind::body, {"body of the plane, the first ball or the ring", row["body1"]});
+  v.reference("body2", f.body2, ElementKind::body, {"body of the ball, or of a point", row["body2"]});
+  v.point("point1", f.point1, f.body1, {"point of the plane, or centre [m]", row["point1"], kLength});
+  v.point("point2", f.point2, f.body2, {"centre of the ball [m]", row["point2"], kLength});
+  v.point("normal1", f.normal1, f.body1, {"out of a plane, in the axes of body1", row["normal1"]});
+  v.number("radius1", f.radius1, {"of the first ball or the ring [m]", row["radius1"], kLength});
+  v.number("radius2", f.radius2, {"of the ball; 0: a point [m]", row["radius2"], kLength});
+  v.plain("inside", f.inside, kAny, {"whether the ball is inside of the ring of radius1"});
+  describe_one_sided(v, f, row);
+}
+
 void describe(auto& v, Like<UserForceSpec> auto& f, const TypeRow& row) {
   v.text("force", f.force, {"name of a force of a plug-in or of the program", row["force"]});
   v.references("bodies", f.bodies, ElementKind::body,
@@ -468,6 +497,9 @@ void describe(auto& v, Like<SimulationSettings> auto& s) {
   v.instead_of("accuracy", "integrator", Words{"type rtol atol step options"});
   v.numbers("events", s.events, kAny,
             {"times at which a law may jump or have a kink: a step ends there [s]", Need::optional, dimension::kTime});
+  v.choice("kinks", s.follows_kinks, kKinks,
+           {"steps end where laws and costs have kinks or jump, and gradients follow these instants (locate); ignore "
+            "them, for comparison"});
   v.plain("adjoint_memory_mib", s.adjoint_memory_mib, kPositive,
           {"memory of an adjoint run for the forward motion [MiB]; steps that do not fit are computed again"});
 }
