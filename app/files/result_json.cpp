@@ -60,6 +60,7 @@ Json to_json(const SimulationStatistics& statistics) {
     json["stability_limited_steps"] = statistics.stability_limited_steps;
     if (statistics.stability_limited_steps > 0) json["fastest_rate"] = statistics.stiffest_rate;
   }
+  if (statistics.kinks > 0) json["kinks"] = statistics.kinks;
   if (statistics.adjoint_memory_bytes > 0) {
     json["adjoint_memory_bytes"] = statistics.adjoint_memory_bytes;
     json["recomputed_steps"] = statistics.recomputed_steps;

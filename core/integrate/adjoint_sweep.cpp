@@ -247,6 +247,15 @@ bool AdjointSweep::implicit_back(const StageGroup& g) {
   return true;
 }
 
+void AdjointSweep::cross_back(Switches& switches, const SwitchEvent& event, const StatePoint& at) {
+  if (!set_event(switches, event, at, true)) return;
+  for (Bars& b : bars_) {
+    const double kappa = (event_.jump.dot(b.lambda) + event_.jump_of_costs(b.objective)) / event_.rate;
+    b.lambda -= kappa * event_.g_y;
+    b.rho -= kappa * event_.g_rho;
+  }
+}
+
 Eigen::MatrixXd AdjointSweep::lambda() const {
   Eigen::MatrixXd lambda(mechanism_.states(), static_cast<Eigen::Index>(bars_.size()));
   for (const Bars& b : bars_) lambda.col(b.objective) = b.lambda;

@@ -19,6 +19,8 @@ class AdjointSweep : public Sweep {
                std::span<const Cost> costs, bool watched, const StatePoint& end);
 
   bool step_back(const StoredStep& step);
+  // Moves the cotangents from after an event to before it (sweep.hpp).
+  void cross_back(Switches& switches, const SwitchEvent& event, const StatePoint& at);
   // lambda at the current time, 14n x objectives; and d psi/d rho of all that was swept, parameters x objectives
   // (without the dependence of the initial state).
   Eigen::MatrixXd lambda() const;

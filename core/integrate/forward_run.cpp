@@ -27,40 +27,60 @@ std::optional<MotionSolver> motion_of(const Mechanism& mechanism, const Simulati
   return std::optional<MotionSolver>(std::in_place, mechanism, settings.formulation);
 }
 
+// Whether a step ends at an event there, which derivatives follow. They do not follow a switch that is no longer held.
+bool is_event(const StepSequence& steps, double t) {
+  const double apart = JumpWatch::kApart * (steps.times.back() - steps.times.front());
+  bool found = false;
+  for (const SwitchEvent& event : steps.events) {
+    if (std::abs(steps.times[event.step] + steps.sizes[event.step] - t) > apart) continue;
+    if (event.after == 0) return false;
+    found = true;
+  }
+  return found;
+}
+
 }  // namespace
 
 ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                        Assembly assembly)
-    : mechanism_(mechanism),
+    : given_(mechanism),
+      given_costs_(costs),
+      switches_(mechanism, costs, settings),
+      mechanism_(switches_.mechanism()),
       settings_(settings),
-      costs_(costs),
+      costs_(switches_.costs()),
       method_(method_of(settings)),
       assembly_(std::move(assembly)),
-      motion_(motion_of(mechanism, settings)),
+      motion_(motion_of(mechanism_, settings)),
       result_(result_at_start(assembly_, settings.start_time, costs.size())),
-      quadrature_(mechanism, method_, costs, QuadratureWatch::Of::values, motion()),
+      quadrature_(mechanism_, method_, costs_, QuadratureWatch::Of::values, motion()),
       y_(mechanism.states()) {}
 
-void ForwardRun::go(const Sampling& sampling, const RunOptions& options, const Follow& follow) {
+void ForwardRun::go(const Sampling& sampling, const RunOptions& options, const Follow& follow, const Cross& cross) {
   if (!result_.ok()) return;
   schedule_.emplace(costs_, sampling.times, settings_.end_time);
   sampling_ = &sampling;
   judges_ = !options.frozen;
   bool followed = true;
-  ObserverOf follower([&](const SeenStep& seen) {
-    const Step& step = *seen.stages;
-    shift_in_time_ = std::max(shift_in_time_, step.K.col(0).cwiseAbs().maxCoeff() / step.y0.cwiseAbs().maxCoeff() *
-                                                  (settings_.end_time - settings_.start_time));
-    followed = follow(step, samples_) && followed;
-    return through_zero_length(mechanism_.data(), step.t, step.y0, step.t1, step.y1);
-  });
+  ObserverOf follower(
+      [&](const SeenStep& seen) {
+        const Step& step = *seen.stages;
+        shift_in_time_ = std::max(shift_in_time_, step.K.col(0).cwiseAbs().maxCoeff() / step.y0.cwiseAbs().maxCoeff() *
+                                                      (settings_.end_time - settings_.start_time));
+        followed = follow(step, samples_) && followed;
+        return through_zero_length(mechanism_.data(), step.t, step.y0, step.t1, step.y1);
+      },
+      cross);
   std::optional<JumpWatch> jumps;
   std::vector<StepObserver*> observers{this};
   if (follow && judges_)
-    observers.push_back(&jumps.emplace(mechanism_, settings_, costs_, motion(), result_.statistics.jumps));
+    observers.push_back(&jumps.emplace(given_, settings_, given_costs_, motion(), result_.statistics.jumps));
   if (follow) observers.push_back(&follower);
   StepAttempt attempt(mechanism_, settings_, method_);
-  RungeKuttaRun(attempt, costs_, options, result_).go(assembly_.result().y, assembly_.result().angles, observers);
+  RungeKuttaRun(attempt, costs_, options, result_, &switches_, motion())
+      .go(assembly_.result().y, assembly_.result().angles, observers);
+  std::erase_if(result_.statistics.jumps, [&](const Jump& jump) { return is_event(result_.steps, jump.t); });
+  result_.statistics.kinks = static_cast<long>(result_.steps.events.size());
   quadrature_.add_to(result_.statistics);
   angles_end_ = attempt.step().angles0;
   if (result_.ok() && !followed)

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/dynamics/motion_solver.hpp"
+#include "core/event/switches.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/run/cost.hpp"
 #include "core/run/sample_schedule.hpp"
@@ -24,14 +25,18 @@ class ForwardRun : private StepObserver {
  public:
   // False where a factorisation failed.
   using Follow = std::function<bool(const Step&, std::span<const SampleEvent>)>;
+  // At an event, with the switch still held on its side before it.
+  using Cross = std::function<void(const SwitchEvent&, const StatePoint&)>;
 
   // Throws std::invalid_argument where settings name no Runge-Kutta method, or one that lacks a step.
   ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
              Assembly assembly);
 
-  // `follow` may be empty.
-  void go(const Sampling& sampling, const RunOptions& options, const Follow& follow);
+  // `follow` and `cross` may be empty.
+  void go(const Sampling& sampling, const RunOptions& options, const Follow& follow, const Cross& cross = {});
 
+  // Those of the derivatives, too.
+  Switches& switches() { return switches_; }
   const Method& method() const { return method_; }
   const Assembly& assembly() const { return assembly_; }
   SimulationResult& result() { return result_; }
@@ -49,9 +54,12 @@ class ForwardRun : private StepObserver {
   void sample(const Step& step);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 
-  const Mechanism mechanism_;
+  const Mechanism given_;
+  const std::span<const Cost> given_costs_;
+  Switches switches_;
+  const Mechanism mechanism_;  // of the switches
   const SimulationSettings settings_;
-  std::span<const Cost> costs_;
+  const std::span<const Cost> costs_;
   const Method& method_;
   Assembly assembly_;
   std::optional<MotionSolver> motion_;  // where some sensor needs it

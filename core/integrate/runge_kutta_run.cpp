@@ -15,6 +15,7 @@ namespace mbsopt {
 namespace {
 
 constexpr double kMostSteps = 1e10;
+constexpr double kInstant = 1e-12;       // of the run: pieces of functions of time end within a tenth of it
 constexpr double kPartsOfPlaced = 1000;  // of rounded_step(): a thousandth moves a stage by less than matters
 
 // Jumps, as those of a held signal.
@@ -32,7 +33,7 @@ std::vector<KinkedSignal> with_jumps(std::vector<KinkedSignal> kinks, std::vecto
 }  // namespace
 
 RungeKuttaRun::RungeKuttaRun(StepAttempt& attempt, std::span<const Cost> costs, const RunOptions& options,
-                             SimulationResult& result)
+                             SimulationResult& result, Switches* switches, MotionSource* motion)
     : attempt_(attempt),
       step_(attempt.step()),
       mechanism_(attempt.mechanism()),
@@ -47,13 +48,26 @@ RungeKuttaRun::RungeKuttaRun(StepAttempt& attempt, std::span<const Cost> costs, 
       controller_(attempt.method().error_order, integrator_.options),
       events_(settings_.events, settings_.start_time, end_),
       kink_control_({}, settings_.start_time, end_),
-      guard_(mechanism_.data(), attempt.projector(), settings_, result.statistics, !frozen_),
+      switches_(switches && switches->count() > 0 ? switches : nullptr),
+      guard_(switches ? switches->given().data() : mechanism_.data(), attempt.projector(), settings_, result.statistics,
+             !frozen_),
       penalty_(mechanism_.data()),
       stiffness_(attempt.method(), mechanism_.states(), result.statistics) {
   if (adaptive_ && attempt.responses() > 0) passage_.emplace(attempt.method(), attempt.responses());
   if (frozen_) return;
   pulses_.emplace(mechanism_, settings_, costs, pulse_nodes(attempt.method()));
-  kink_control_ = KinkControl(with_jumps(kinks_of(mechanism_, costs), pulses_->jumps()), settings_.start_time, end_);
+  std::vector<double> jumps = pulses_->jumps();
+  if (switches_) {
+    crossings_.emplace(*switches_, settings_, motion);
+    for (std::size_t k = 0; k < switches_->count(); ++k) {
+      if (!switches_->is_of_time(k)) continue;
+      for (const double zero : switches_->zeros(k, settings_.start_time, end_)) {
+        std::erase_if(jumps, [&](double t) { return std::abs(t - zero) <= kInstant * span_; });
+        jumps.push_back(zero);
+      }
+    }
+  }
+  kink_control_ = KinkControl(with_jumps(kinks_of(mechanism_, costs), std::move(jumps)), settings_.start_time, end_);
 }
 
 void RungeKuttaRun::go(const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
@@ -73,7 +87,7 @@ void RungeKuttaRun::go(const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
       reject(outcome);
       continue;
     }
-    if (is_split() || is_better_placed_elsewhere()) continue;
+    if (passes_event() || is_better_placed_elsewhere()) continue;
     note_step();
     if (!result_.ok()) break;
     choose_next_size();
@@ -100,6 +114,12 @@ SeenStep RungeKuttaRun::seen() const {
 bool RungeKuttaRun::begin(const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   const double t = frozen_ && frozen_index_ < last_ ? frozen_->times[frozen_index_] : settings_.start_time;
   result_.last_good_time = t;
+  if (crossings_) {
+    crossings_->begin({t, y, angles});
+    result_.steps.sides = switches_->sides();
+  } else if (switches_) {
+    follow_given_events();
+  }
   if (std::string words = objection_to_start(observers_, {t, y, angles}); !words.empty()) {
     result_.stop(SimulationStatus::not_credible, std::move(words));
     return false;
@@ -123,6 +143,23 @@ bool RungeKuttaRun::begin(const Eigen::VectorXd& y, const Eigen::VectorXd& angle
     }
   }
   return true;
+}
+
+// Other costs have other switches, so a run again with its own costs is the only one that holds theirs.
+void RungeKuttaRun::follow_given_events() {
+  const std::size_t held = is_part_ ? switches_->count() : switches_->of_mechanism();
+  for (std::size_t k = 0; k < switches_->count(); ++k)
+    switches_->hold(k, k < held && k < frozen_->sides.size() ? frozen_->sides[k] : 0);
+  given_events_.clear();
+  for (const SwitchEvent& event : frozen_->events) {
+    if (event.of >= held) continue;
+    given_events_.push_back(event);
+    if (event.step < frozen_index_) switches_->hold(event.of, event.after);
+  }
+  if (!is_part_) {
+    result_.steps.sides = switches_->sides();
+    result_.steps.events = given_events_;
+  }
 }
 
 // Tolerances that no step can meet explain whatever else may have become of the steps.
@@ -183,6 +220,8 @@ StepOutcome RungeKuttaRun::try_step() {
   const auto [outcome, error] = attempt_.solve(h_, goal, passage_ && passage_->near(step_.t, h_));
   error_ = error;
   if (outcome != StepOutcome::accepted) return outcome;
+  if (crossings_ && adaptive_) error_ = crossings_->with_derivatives(step_.t, h_, error);
+  if (error_ > 1 && adaptive_) return StepOutcome::rejected;
   if (pulses_ && passes_over_pulse()) return StepOutcome::rejected;
   const double t1 = ends_with(step_.t + h_) ? end_ : step_.t + h_;
   return attempt_.finish(t1, std::ranges::any_of(observers_, [&](auto* o) { return o->reads_inside(t1); }));
@@ -190,6 +229,7 @@ StepOutcome RungeKuttaRun::try_step() {
 
 // Returns whether to try shorter steps, since this one misses a pulse; its error is that of the pulse.
 bool RungeKuttaRun::passes_over_pulse() {
+  if (h_ <= kInstant * span_) return false;
   const double least = std::max(PulseWatch::kShortest * span_, integrator_.options.min_step.value_or(0));
   const auto change = [&](double at, double beside, double duration) {
     return attempt_.change_by(at, beside, duration);
@@ -224,15 +264,31 @@ bool RungeKuttaRun::is_better_placed_elsewhere() {
   return false;
 }
 
-// Returns whether to try the step again up to the first instant at which an observer wants it to end.
-bool RungeKuttaRun::is_split() {
-  if (frozen_) return false;
-  double end = step_.t1;
-  for (StepObserver* const observer : observers_) end = std::min(end, observer->split(seen()));
-  if (!(end < step_.t1 && end > step_.t)) return false;
+// Returns whether to try the step again: up to an event within it, or after one at its start.
+bool RungeKuttaRun::passes_event() {
+  if (!crossings_) return false;
+  const auto& [size, at_start] = crossings_->look_at(step_, error_);
+  for (SwitchEvent event : at_start) {
+    if (result_.statistics.steps > 0) {
+      event.step = result_.steps.sizes.size() - 1;
+      result_.steps.events.push_back(event);
+      cross(event, step_.t, step_.y0, step_.angles0);
+    } else {
+      switches_->hold(event.of, event.after);
+      result_.steps.sides = switches_->sides();
+    }
+  }
+  if (!at_start.empty()) attempt_.restart();
+  if (!size) return !at_start.empty();
   if (!split_) split_ = h_;
-  h_ = end - step_.t;
+  h_ = *size;
   return true;
+}
+
+void RungeKuttaRun::cross(const SwitchEvent& event, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  for (StepObserver* const observer : observers_) observer->cross(event, {t, y, angles});
+  switches_->hold(event.of, event.after);
+  if (crossings_) crossings_->changed(event, step_.t);
 }
 
 void RungeKuttaRun::reject(StepOutcome outcome) {
@@ -331,13 +387,31 @@ void RungeKuttaRun::choose_next_size() {
 void RungeKuttaRun::advance() {
   const bool event = !frozen_ && events_.reached(step_.t1);
   const bool kink = !frozen_ && !event && step_.t1 < end_ && kink_control_.reached(step_.t1);
-  attempt_.advance(event ? events_.resume_time() : kink ? kink_control_.resume_time() : step_.t1);
+  const double t1 = step_.t1, next = event                                      ? events_.resume_time()
+                                     : kink                                     ? kink_control_.resume_time()
+                                     : crossings_ && crossings_->ends_at_time() ? t1 + kink_control_.past()
+                                                                                : t1;
+  const std::size_t events_before = result_.steps.events.size();
+  std::span<const SwitchEvent> changes;
+  if (crossings_ && t1 < end_) {
+    for (SwitchEvent change : crossings_->advance(step_, next)) {
+      change.step = result_.steps.sizes.size() - 1;
+      result_.steps.events.push_back(change);
+    }
+    changes = std::span(result_.steps.events).subspan(events_before);
+  } else if (switches_ && frozen_) {
+    const auto found = std::ranges::equal_range(given_events_, frozen_index_, {}, &SwitchEvent::step);
+    changes = {found.begin(), found.end()};
+  }
+  attempt_.advance(next);
+  for (const SwitchEvent& change : changes) cross(change, t1, step_.y0, step_.angles0);
   if (event && adaptive_) {  // the steps before say nothing about those after it
     controller_ = StepController(attempt_.method().error_order, integrator_.options);
     h_ = limited(attempt_.first_size(end_ - step_.t));
     if (passage_) passage_->forget();
   }
-  if (event || kink) attempt_.restart();
+  if (!changes.empty() && adaptive_) h_ = std::min(h_, limited(attempt_.first_size(end_ - step_.t)));
+  if (event || kink || !changes.empty()) attempt_.restart();
   result_.last_good_time = step_.t;
   ++frozen_index_;
   report_step({step_.t, step_.y0, step_.angles0}, options_, result_);

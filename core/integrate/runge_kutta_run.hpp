@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "core/event/crossing_search.hpp"
+#include "core/event/switches.hpp"
 #include "core/integrate/step_attempt.hpp"
 #include "core/run/cost.hpp"
 #include "core/run/simulation_result.hpp"
@@ -30,7 +32,9 @@ namespace mbsopt {
 class RungeKuttaRun {
  public:
   // Steps end at the kinks of sampled functions in laws and costs, and at the jumps of functions of time.
-  RungeKuttaRun(StepAttempt& attempt, std::span<const Cost> costs, const RunOptions& options, SimulationResult& result);
+  // `switches` are those of the attempt's mechanism and of the costs, whose events end steps, too; or null.
+  RungeKuttaRun(StepAttempt& attempt, std::span<const Cost> costs, const RunOptions& options, SimulationResult& result,
+                Switches* switches = nullptr, MotionSource* motion = nullptr);
 
   // Fills status, statistics, steps, y_end. The observers see each accepted step in their order. Of given steps, it
   // takes those from `first` on and before `last`.
@@ -43,7 +47,9 @@ class RungeKuttaRun {
   bool choose_size();
   StepOutcome try_step();
   bool passes_over_pulse();
-  bool is_split();
+  void follow_given_events();
+  bool passes_event();
+  void cross(const SwitchEvent& event, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
   bool is_better_placed_elsewhere();
   void reject(StepOutcome outcome);
   void note_step();
@@ -76,6 +82,9 @@ class RungeKuttaRun {
   std::optional<PulseWatch> pulses_;        // unless steps are given
   EventTimes events_;
   KinkControl kink_control_;
+  Switches* const switches_;
+  std::optional<CrossingSearch> crossings_;  // unless steps are given
+  std::vector<SwitchEvent> given_events_;    // with given steps
   RunGuard guard_;
   PenaltyWatch penalty_;
   StiffnessWatch stiffness_;
@@ -84,7 +93,7 @@ class RungeKuttaRun {
   double error_ = 0;                        // of the step tried last
   double asked_ = 0;                        // h before a kink made it shorter
   double wanted_ = 0, largest_ = INFINITY;  // sizes that the error and the limits allow, where the passage chooses h
-  std::optional<double> split_;             // the size before an observer made it shorter
+  std::optional<double> split_;             // the size before an event made it shorter
   std::size_t frozen_index_ = 0, last_ = 0;
   bool is_part_ = false;  // of the given steps, which the result does not list again
   int placed_again_ = 0;

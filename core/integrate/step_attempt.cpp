@@ -206,6 +206,7 @@ void StepAttempt::advance(double t) {
 }
 
 void StepAttempt::restart() {
+  first_stage_known_ = false;
   if (!implicit_ || !dynamics_.evaluate(step_.t, step_.y0, step_.angles0, ydot_)) return;
   ++evaluations_;
   implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());

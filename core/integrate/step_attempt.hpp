@@ -55,7 +55,7 @@ class StepAttempt {
   double change_by(double at, double beside, double duration);
   void reject();           // the residual of this attempt does not count
   void advance(double t);  // accepts it: the start moves to its end, whose time becomes t
-  void restart();          // accelerations jump at the start: implicit stages forget the step before
+  void restart();          // accelerations jump at the start, and nothing before it counts
   bool keeps_sizes() const { return implicit_.has_value(); }  // a new size costs a factor
 
   // Explicit methods through closed loops have responses at the end (Projector::response); others have none.

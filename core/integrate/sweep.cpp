@@ -1,9 +1,16 @@
 #include "core/integrate/sweep.hpp"
 
+#include <algorithm>
+
 #include "core/integrate/model_choice.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
+namespace {
+
+constexpr double kKink = 1e-9;  // of f and G: at a kink both sides differ by the rounding of the instant
+
+}  // namespace
 
 Sweep::Sweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
              std::span<const Cost> costs, bool watched)
@@ -36,6 +43,37 @@ bool Sweep::set_running_gradient(const Step& step, std::size_t objective, int no
   node_rate(rk_, step, node, ydot_);
   watch_->take_gradient(objective, node, weight, g_.y, ydot_, g_.rho);
   return true;
+}
+
+bool Sweep::set_event(Switches& switches, const SwitchEvent& event, const StatePoint& at, bool back) {
+  const auto objectives = static_cast<Eigen::Index>(costs_.size());
+  const StatePoint here{at.t, at.y, at.angles, motion()};
+  event_.jump.setZero(at.y.size());
+  event_.jump_of_costs.setZero(objectives);
+  double size = 0, size_of_costs = 0;
+  const auto add_side = [&](int side, double sign) {
+    switches.hold(event.of, side);
+    if (!dynamics_.evaluate(at.t, at.y, at.angles, ydot_)) return false;
+    event_.jump += sign * ydot_;
+    size = std::max(size, ydot_.cwiseAbs().maxCoeff());
+    for (Eigen::Index o = 0; o < objectives; ++o) {
+      const PointCost* const running = costs_[static_cast<std::size_t>(o)].running.get();
+      const double G = running ? running->value(here) : 0;
+      event_.jump_of_costs(o) += sign * G;
+      size_of_costs = std::max(size_of_costs, std::abs(G));
+    }
+    return true;
+  };
+  const bool evaluated = add_side(event.after, -1) && add_side(event.before, 1);
+  if (evaluated) event_.rate = 0;
+  event_.g_y.setZero(at.y.size());
+  event_.g_rho.setZero(g_.rho.size());
+  switches.add_gradient(event.of, here, 1, event_.g_y, event_.g_rho, event_.rate);
+  event_.rate += event_.g_y.dot(ydot_);
+  if (!back) switches.hold(event.of, event.after);
+  return evaluated && event.before * event.after != 0 &&
+         (event_.jump.cwiseAbs().maxCoeff() > kKink * size ||
+          (objectives > 0 && event_.jump_of_costs.cwiseAbs().maxCoeff() > kKink * size_of_costs));
 }
 
 void Sweep::add_to(SimulationStatistics& s) const {

@@ -8,6 +8,7 @@
 
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
+#include "core/event/switches.hpp"
 #include "core/run/cost.hpp"
 #include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
@@ -35,6 +36,20 @@ class Sweep {
   void end_step(const Step& step) {
     if (watch_) watch_->end_step(step);
   }
+  // An event of the run at the state y. With the directions D and the cotangents lambda of y at fixed times,
+  //
+  //   dt = -(g_y D + g_rho) drho/rate        rate = g_y f- + g_t      g: the switch
+  //   D+ = D + (f- - f+) dt                  psi += (G- - G+) dt      G: the integrands of running costs
+  //
+  // and transposed  kappa = ((f- - f+)'lambda + G- - G+)/rate,  lambda- = lambda - g_y'kappa,  mu -= g_rho'kappa.
+  // f and G are those of both sides at the event. Where they agree (a kink) nothing changes.
+  struct Event {
+    Eigen::VectorXd jump, jump_of_costs;  // f- - f+, G- - G+
+    Eigen::VectorXd g_y, g_rho;
+    double rate = 0;
+  };
+  // Sets event_. Returns whether anything jumps. The switch is held on its side after it, or before it for `back`.
+  bool set_event(Switches& switches, const SwitchEvent& event, const StatePoint& at, bool back);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 
   const Mechanism mechanism_;
@@ -46,6 +61,7 @@ class Sweep {
   std::optional<RosenbrockStages> rosenbrock_;
   Eigen::VectorXd y_;
   CostGradient g_;
+  Event event_;
 
  private:
   std::optional<MotionSolver> motion_;  // where some sensor needs it

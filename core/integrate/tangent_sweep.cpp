@@ -247,6 +247,19 @@ bool TangentSweep::follow(const Step& step, std::span<const SampleEvent> events)
   return true;
 }
 
+void TangentSweep::cross(Switches& switches, const SwitchEvent& event, const StatePoint& at) {
+  if (!set_event(switches, event, at, false)) return;
+  for (Block& b : blocks_) {
+    Lanes<1> dt = event_.g_y.transpose() * b.y0;
+    for (int k = 0; k < kLanes; ++k)
+      if (const int p = b.parameters.parameter[k]; p >= 0) dt(k) += event_.g_rho(p);
+    dt /= -event_.rate;
+    b.y0 += event_.jump * dt;
+    for (int k = 0; k < kLanes; ++k)
+      if (const int p = b.parameters.parameter[k]; p >= 0) psi_rho_.col(p) += dt(k) * event_.jump_of_costs;
+  }
+}
+
 void TangentSweep::finish(const StatePoint& end) {
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     if (!costs_[o].terminal) continue;

@@ -23,6 +23,8 @@ class TangentSweep : public Sweep {
 
   // Advances over one step. False where a factorisation failed.
   bool follow(const Step& step, std::span<const SampleEvent> events);
+  // Moves the directions from before an event to after it (sweep.hpp).
+  void cross(Switches& switches, const SwitchEvent& event, const StatePoint& at);
   // Adds the terminal costs; call once, after the last step.
   void finish(const StatePoint& end);
 

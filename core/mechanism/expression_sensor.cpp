@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/program_sensors.hpp"
 #include "core/mechanism/sensor_gradient.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/scene/scene_facts.hpp"
@@ -58,8 +59,9 @@ struct ExpressionSensor final : SensorFunction {
                 : program.add_gradient(span(s.x), 1, span(s.x_bar), s.program);
     if (!to) return result;
     for (const int k : d.active) to->rho_bar(k) += to->scale * s.x_bar[static_cast<std::size_t>(k)];
+    if (to->t_bar) *to->t_bar += to->scale * s.x_bar[time];
     const auto add = [&](const SensorPtr& sensor, double weight) {
-      SensorGradient part{d, to->scale * weight, to->y_bar, to->rho_bar};
+      SensorGradient part{d, to->scale * weight, to->y_bar, to->rho_bar, to->t_bar};
       if (part.scale != 0) sensor->evaluate(d, at, &part);
     };
     for (const auto& [input, sensor, rate] : below) {
@@ -91,25 +93,18 @@ struct ExpressionSensor final : SensorFunction {
   std::span<double> span(std::vector<double>& x) const { return {x.data(), inputs}; }
 };
 
-}  // namespace
-
-std::unique_ptr<SensorFunction> make_expression(Compilation& model, const Sensor& s, const std::string& where) {
-  Symbols symbols = model.fields.symbols();
-  add_time_and_sensors(symbols, model.scene);
+std::unique_ptr<ExpressionSensor> sensor_of(Program program, std::size_t parameters, std::span<const SensorPtr> sensors,
+                                            std::size_t inputs) {
   auto out = std::make_unique<ExpressionSensor>();
-  try {
-    out->program = Program(s.value, symbols);
-  } catch (const UnknownName& e) {
-    throw SceneError(where + ".value: " + e.what());
-  }
-  out->inputs = static_cast<std::size_t>(symbols.inputs());
-  out->time = static_cast<std::size_t>(symbols.input("t"));
+  out->program = std::move(program);
+  out->inputs = inputs;
+  out->time = parameters;
   for (const int i : out->program.used_inputs()) {
     const std::size_t input = static_cast<std::size_t>(i);
     if (input < out->time)
       out->parameters.push_back(input);
     else if (input > out->time)
-      out->below.push_back({input, model.data.sensors[input - out->time - 1], nullptr});
+      out->below.push_back({input, sensors[input - out->time - 1], nullptr});
     else
       out->reads = Reads::time_and_state;
   }
@@ -117,6 +112,26 @@ std::unique_ptr<SensorFunction> make_expression(Compilation& model, const Sensor
   // A condition's equation must be linear in the velocities; an expression of them may not be.
   if (out->reads == Reads::velocities) out->reads = Reads::state;
   return out;
+}
+
+}  // namespace
+
+std::unique_ptr<SensorFunction> make_expression(Compilation& model, const Sensor& s, const std::string& where) {
+  Symbols symbols = model.fields.symbols();
+  add_time_and_sensors(symbols, model.scene);
+  Program program;
+  try {
+    program = Program(s.value, symbols);
+  } catch (const UnknownName& e) {
+    throw SceneError(where + ".value: " + e.what());
+  }
+  return sensor_of(std::move(program), static_cast<std::size_t>(symbols.input("t")), model.data.sensors,
+                   static_cast<std::size_t>(symbols.inputs()));
+}
+
+SensorPtr expression_sensor(const MechanismData& data, Program program) {
+  const std::size_t parameters = static_cast<std::size_t>(data.rho.size());
+  return sensor_of(std::move(program), parameters, data.sensors, parameters + 1 + data.sensors.size());
 }
 
 }  // namespace mbsopt

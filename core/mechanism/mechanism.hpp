@@ -25,6 +25,7 @@ class Mechanism {
   Mechanism(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active = {},
             std::vector<std::shared_ptr<const UserForce>> user_forces = {},
             std::shared_ptr<ScenePrograms> programs = nullptr);
+  explicit Mechanism(std::shared_ptr<const MechanismData> data) : data_(std::move(data)) {}
 
   int bodies() const;  // the ground not counted
   int states() const;  // of y: 14 per body

@@ -6,11 +6,12 @@
 
 namespace mbsopt {
 
-// y_bar, rho_bar += scale d/dy, d/drho (of all parameters)
+// y_bar, rho_bar += scale d/dy, d/drho (of all parameters). t_bar, if it is not null, gets that of t in expressions.
 struct SensorGradient {
   const MechanismData& data;
   double scale;
   VecOut y_bar, rho_bar;
+  double* t_bar = nullptr;
 
   // Adds scale times a gradient in the frame of a body, and in a field.
   void add_frame(const Frame& b, int body, const FrameBar& bar) { add_pull_back(b, body, bar, scale, y_bar); }

@@ -17,6 +17,7 @@
 namespace mbsopt {
 
 class Mechanism;         // core/mechanism/mechanism.hpp
+class Program;           // core/expression/program.hpp
 struct SwitchedProgram;  // core/expression/program_switches.hpp
 
 // y = (q, v): q has 7 numbers per body (r_g, p), v = qdot the same; y.head(7n) = q, y.tail(7n) = v.
@@ -46,6 +47,9 @@ struct PointCost {
   virtual const Eigen::VectorXd* rho() const { return nullptr; }
   // The expression that shows where the value jumps, in all parameters, t and all sensors; null if there is none.
   virtual const SwitchedProgram* program() const { return nullptr; }
+  // The same cost of another mechanism of its scene, and with another program of the same inputs, if it is not null.
+  // A cost that has neither returns null.
+  virtual std::shared_ptr<const PointCost> bound_to(const Mechanism&, const Program*) const { return nullptr; }
 };
 
 // The gradient of a cost at one point, times a weight.

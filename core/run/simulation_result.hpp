@@ -13,10 +13,18 @@
 
 namespace mbsopt {
 
+// A switch that passes from one side to another where a step ends (core/event/switches.hpp).
+struct SwitchEvent {
+  std::size_t step = 0, of = 0;  // the indices of the step and of the switch
+  int before = 0, after = 0;     // its sides
+};
+
 // Accepted steps: times.size() == sizes.size(); step i goes from times[i] by sizes[i].
 struct StepSequence {
   std::vector<double> times, sizes;
-  bool to_the_end = true;  // the last step is the run's last, not one before it
+  bool to_the_end = true;             // the last step is the run's last, not one before it
+  std::vector<int> sides{};           // of all switches at the start
+  std::vector<SwitchEvent> events{};  // in their order
 
   void add(double t, double h) {
     times.push_back(t);
@@ -66,6 +74,7 @@ struct SimulationStatistics {
   // factor_blocks counts the blocks of the explicit equations' factor (6 x 6, or 3 x 3 in the plane), diagonal ones
   // included. `linearised_states` counts the states at which derivatives of these equations were evaluated.
   long factor_blocks = 0, linearised_states = 0;
+  long kinks = 0;  // at which steps ended: laws and costs passed from one branch to another
   double wall_seconds = 0;
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
   double relative_position_violation = 0;                         // the same, lengths in units of the mechanism's

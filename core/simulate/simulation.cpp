@@ -51,10 +51,13 @@ SimulationResult integrate_tlm(const Mechanism& mechanism, const SimulationSetti
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   if (!result.ok()) return run.finish();
-  TangentSweep sweep(mechanism, settings, run.method(), costs, sampling, run.assembly().tangent(), !options.frozen,
-                     result.psi_rho);
-  run.go({sampling.times, {}}, with_exact_stages(options),
-         [&](const Step& step, std::span<const SampleEvent> events) { return sweep.follow(step, events); });
+  Switches& switches = run.switches();
+  TangentSweep sweep(switches.mechanism(), settings, run.method(), switches.costs(), sampling, run.assembly().tangent(),
+                     !options.frozen, result.psi_rho);
+  run.go(
+      {sampling.times, {}}, with_exact_stages(options),
+      [&](const Step& step, std::span<const SampleEvent> events) { return sweep.follow(step, events); },
+      [&](const SwitchEvent& event, const StatePoint& at) { sweep.cross(switches, event, at); });
   if (result.ok()) sweep.finish(run.end());
   sweep.add_to(result.statistics);
   note_magnification(sweep.magnification(), run.shift_in_time(), settings, result.statistics);
@@ -72,7 +75,8 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
     return true;
   });
   if (!result.ok()) return run.finish();
-  AdjointSweep sweep(mechanism, settings, run.method(), costs, !options.frozen, run.end());
+  Switches& switches = run.switches();
+  AdjointSweep sweep(switches.mechanism(), settings, run.method(), switches.costs(), !options.frozen, run.end());
   bool stopped = false;
   double t_back = settings.end_time;
   const auto go_on = [&](double) { return !(stopped = options.progress && !options.progress(settings.end_time)); };
@@ -80,16 +84,25 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
   std::optional<StepAttempt> attempt;
   SimulationResult again;
   const auto replay = [&](const Snapshot& from, long last, StepObserver& sink) {
-    if (!attempt) attempt.emplace(mechanism, settings, run.method());
+    if (!attempt) attempt.emplace(switches.mechanism(), settings, run.method());
     again = {};
     const RunOptions given{&result.steps, go_on};
     StepObserver* const observer = &sink;
-    RungeKuttaRun(*attempt, {}, given, again)
+    RungeKuttaRun(*attempt, {}, given, again, &switches)
         .go(from.y0, from.angles, {&observer, 1}, static_cast<std::size_t>(from.step), static_cast<std::size_t>(last));
     return again.ok();
   };
+  std::vector<int> sides = switches.sides();
+  auto event = result.steps.events.rbegin();
+  std::size_t index = result.steps.sizes.size();
   const bool swept = checkpoints.go_back(replay, [&](const StoredStep& step) {
     t_back = step.t;
+    switches.hold_all(sides);  // a replay has its own
+    for (--index; event != result.steps.events.rend() && event->step == index; ++event) {
+      const Eigen::VectorXd y = step.y1(), angles = step.angles0();
+      sweep.cross_back(switches, *event, {step.t1, y, angles});
+      sides[event->of] = event->before;
+    }
     return go_on(t_back) && sweep.step_back(step);
   });
   sweep.add_to(result.statistics);

@@ -50,6 +50,7 @@ class KinkControl {
   }
   // How near to the end a step may stop where a kink lies there.
   double gap() const { return sources_.empty() ? 0 : 1.5 * gap_; }
+  double past() const { return 2 * gap_; }  // how much later than an instant a step begins
   bool crosses() const { return state_ == State::crosses; }
   bool meets() const { return state_ == State::meets; }
   // Returns whether kinks allow less than h.

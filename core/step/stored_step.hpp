@@ -19,12 +19,13 @@ struct StoredStep {
   // All of it but the stages Y, their velocities in K, and the angles at the end. step: of the same sizes.
   void restore(const Method& rk, Step& step) const;
   Eigen::Map<const Eigen::VectorXd> y0() const { return {numbers_.get(), states_}; }
+  Eigen::Map<const Eigen::VectorXd> y1() const { return {numbers_.get() + 2 * states_ + angles_, states_}; }
   Eigen::Map<const Eigen::VectorXd> angles0() const { return {numbers_.get() + states_, angles_}; }
   std::size_t bytes() const;
 
  private:
   Eigen::Index states_, angles_, count_ = 0;
-  std::unique_ptr<double[]> numbers_;  // the parts of a step one after the other, y0 and angles0 first
+  std::unique_ptr<double[]> numbers_;  // the parts of a step: y0, angles0, y_hat, y1, and the others
 };
 
 }  // namespace mbsopt

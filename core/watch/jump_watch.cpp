@@ -12,8 +12,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kApart = 1e-6;    // of the run: times and states have digits for distances within it
-constexpr double kMiddle = 0.471;  // not half: jumps are at round times
+constexpr double kMiddle = 0.471;                             // not half: jumps are at round times
 constexpr double kFar = 1e-2, kNear = 1e-4, kNearest = 1e-6;  // from the zero, of the interval
 constexpr double kRetained = 0.5;    // of the far difference by the near one: |x|^0.15 keeps it, a kink 0.01
 constexpr double kLeastJump = 1e-6;  // of the value: cancellation next to sin(x)/x is less

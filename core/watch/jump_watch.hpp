@@ -30,6 +30,8 @@ namespace mbsopt {
 
 class JumpWatch final : public StepObserver {
  public:
+  static constexpr double kApart = 1e-6;  // of the run: times and states have digits for distances within it
+
   JumpWatch(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
             MotionSource* motion, std::vector<Jump>& found);
 

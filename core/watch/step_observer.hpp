@@ -2,7 +2,7 @@
 // asks its observers in the order of their list. An objection, in words, ends the run.
 #pragma once
 
-#include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,11 +26,10 @@ class StepObserver {
   virtual std::string begin(const StatePoint&) { return {}; }
   // Whether it reads states within a step that ends at t1, which need the stages of dense output.
   virtual bool reads_inside(double /*t1*/) const { return false; }
-  // The instant at which this step should end, if that is before its end. Runge-Kutta methods then try the shorter
-  // step, which is shown again. Given steps are not split.
-  virtual double split(const SeenStep&) { return INFINITY; }
   // Returns an objection to this step, or nothing.
   virtual std::string look_at(const SeenStep& step) = 0;
+  // After the step that ends at an event. The switch is still held on its side before it.
+  virtual void cross(const SwitchEvent&, const StatePoint&) {}
 };
 
 // The first objection of the observers to the start of a run, or to a step.
@@ -45,15 +44,20 @@ inline std::string objection_to(const SeenStep& step, const std::vector<StepObse
   return {};
 }
 
-// A function as an observer of accepted steps.
+// A function as an observer of accepted steps, and one of events, which may be empty.
 template <class Function>
 class ObserverOf final : public StepObserver {
  public:
-  explicit ObserverOf(Function f) : f_(std::move(f)) {}
+  using Cross = std::function<void(const SwitchEvent&, const StatePoint&)>;
+  explicit ObserverOf(Function f, Cross cross = {}) : f_(std::move(f)), cross_(std::move(cross)) {}
   std::string look_at(const SeenStep& step) override { return f_(step); }
+  void cross(const SwitchEvent& event, const StatePoint& at) override {
+    if (cross_) cross_(event, at);
+  }
 
  private:
   Function f_;
+  Cross cross_;
 };
 
 }  // namespace mbsopt

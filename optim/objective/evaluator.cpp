@@ -421,7 +421,7 @@ LadderDerivative certain_differences(const LadderFunction& psi_at, Eigen::Index 
 void Evaluator::add_differences(Evaluation& e) const {
   const Stopwatch stopwatch;
   const bool frozen =
-      options_.differences.frozen_steps && simulated_ > 0 && !is_cvodes(scene_.simulation.integrator.type);
+      options_.differences.frozen_steps && may_freeze(e.steps) && !is_cvodes(scene_.simulation.integrator.type);
   const Eigen::VectorXd size = sizes(e.rho);
   Eigen::MatrixXd psi_rho(e.psi.size(), size.size());
   for (Eigen::Index k = 0; k < size.size(); ++k) {
@@ -459,7 +459,7 @@ Evaluation Evaluator::values(const Eigen::VectorXd& rho) {
 }
 
 Evaluation Evaluator::values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const {
-  return run(rho, Sweep::none, simulated_ == 0 ? nullptr : &steps);
+  return run(rho, Sweep::none, may_freeze(steps) ? &steps : nullptr);
 }
 
 Evaluation Evaluator::gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const {
@@ -467,7 +467,7 @@ Evaluation Evaluator::gradients_on(const StepSequence& steps, const Eigen::Vecto
   if (!backward && method != GradientMethod::tlm && simulated_ > 0)
     throw std::invalid_argument(
         fmt::format("gradients on given steps are by tlm or adjoint, not by {}", to_string(method)));
-  Evaluation e = run(rho, backward ? Sweep::backward : Sweep::forward, simulated_ == 0 ? nullptr : &steps);
+  Evaluation e = run(rho, backward ? Sweep::backward : Sweep::forward, may_freeze(steps) ? &steps : nullptr);
   e.method = method;
   return e;
 }

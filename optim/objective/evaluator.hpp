@@ -104,7 +104,7 @@ class Evaluator {
   // Other objectives have none. None has one if the run fails.
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
 
-  // Evaluates on given steps and leaves the stored point unchanged: values, and discrete gradients by tlm or adjoint.
+  // Evaluates on given steps, unless they end at events, which move, and leaves the stored point unchanged: values, and discrete gradients by tlm or adjoint.
   // CVODES cannot take given steps and throws std::invalid_argument. Not in load cases.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
   Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
@@ -160,6 +160,7 @@ class Evaluator {
   bool has_finite_objectives(Evaluation& e) const;
   bool is_last(const Eigen::VectorXd& rho) const;
   std::size_t gradients_per_run() const;
+  bool may_freeze(const StepSequence& steps) const { return simulated_ > 0 && steps.events.empty(); }
   GradientMethod chosen_method(std::string& choice) const;
   void add_differences(Evaluation& e) const;
   void find_unused();

@@ -86,6 +86,14 @@ class ExpressionCost : public PointCost {
   }
   const Eigen::VectorXd* rho() const override { return &mechanism_.rho(); }
   const SwitchedProgram* program() const override { return compiled_.get(); }
+  std::shared_ptr<const PointCost> bound_to(const Mechanism& mechanism, const Program* program) const override {
+    if (!program) return std::make_shared<ExpressionCost>(compiled_, mechanism);
+    auto changed = std::make_shared<Compiled>(*compiled_);
+    changed->program = *program;
+    std::erase_if(changed->parameters, [&](int k) { return !program->uses(k); });
+    std::erase_if(changed->sensors, [&](const auto& used) { return !program->uses(used.input); });
+    return std::make_shared<ExpressionCost>(std::move(changed), mechanism);
+  }
 
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }

@@ -47,6 +47,10 @@ class Integrand final : public PointCost {
   }
   const Eigen::VectorXd* rho() const override { return x_->rho(); }
   const SwitchedProgram* program() const override { return x_->program(); }
+  std::shared_ptr<const PointCost> bound_to(const Mechanism& mechanism, const Program* program) const override {
+    std::shared_ptr<const PointCost> x = x_->bound_to(mechanism, program);
+    return x ? std::make_shared<Integrand>(std::move(x), kind_, k_, x0_) : nullptr;
+  }
 
  private:
   std::shared_ptr<const PointCost> x_;

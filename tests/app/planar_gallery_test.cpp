@@ -100,7 +100,7 @@ TEST_CASE("the planar model gives the values and gradients of the spatial one on
     REQUIRE((a.ok && b.ok));
     CHECK((a.statistics.solved || a.statistics.factor_blocks > 0));  // blocks of 3 x 3
     const double difference = apart(problem, a, b);
-    double allowed = 1e-10;
+    double allowed = a.steps.events.empty() ? 1e-10 : 1e-6;  // each model finds instants of its own
     for (const double units : {2.0, -2.0})
       if (difference >= 1e-10)
         allowed = std::max(allowed, 2 * apart(problem, spatial(problem.scene, objectives, a.steps, units), b));
@@ -133,7 +133,7 @@ TEST_CASE("both models take steps of their own to the same values and gradients 
       return std::abs(static_cast<long>(e.steps.sizes.size()) - static_cast<long>(b.steps.sizes.size()));
     };
     const double difference = apart(problem, a, b);
-    double allowed = 1e-10;
+    double allowed = a.steps.events.empty() ? 1e-10 : 1e-6;  // each model finds instants of its own
     long steps_allowed = 0;
     if (difference >= allowed || fewer_or_more(a) > 0) {
       for (const double units : {2.0, -2.0}) {

@@ -143,7 +143,8 @@ class Loads:
 
     def add_force(self):
         rng = self.rng
-        makers = [self.tsda, self.tsda, self.rsda, self.force, self.torque, self.bushing, self.friction]
+        makers = [self.tsda, self.tsda, self.rsda, self.force, self.torque, self.bushing, self.friction,
+                  self.stop, self.contact, self.switched]
         fields = rng.choice(makers)()
         if fields:
             self.forces.append({"name": f"f{len(self.forces) + 1}", **fields})
@@ -293,6 +294,76 @@ class Loads:
         if rng.random() < 0.5:
             friction |= {"breakaway": 1.5 * friction["coulomb"], "stribeck_velocity": rate * rng.uniform(0.2, 1)}
         return friction
+
+    def one_sided_spring(self, inertia, size):
+        rng = self.rng
+        k = self.stiffness(inertia)[0] * 10 ** rng.uniform(0, 3)
+        n = rng.choice([1, 1, 1.5, 2])
+        return {"stiffness": k / size ** (n - 1), "exponent": n,
+                "damping": rng.choice([0, rng.uniform(0.01, 0.5) * self.family.time / size])}
+
+    def stop(self):
+        """In a joint, which the motion may come to."""
+        rng, f = self.rng, self.family
+        joints = [j for j in self.m.joints if j.angle is not None or j.displacement is not None]
+        if not joints:
+            return None
+        joint = rng.choice(joints)
+        turns = joint.angle is not None
+        size, start = (1, joint.angle) if turns else (f.length, joint.displacement)
+        bounds = {key: start + sign * size * rng.uniform(0, 0.4) for key, sign in (("lower", -1), ("upper", 1))
+                  if rng.random() < 0.7}
+        if not bounds:
+            return None
+        return ({"type": "stop", "joint": joint.name, "motion": "rotation" if turns else "translation"} | bounds |
+                self.one_sided_spring(self.least(joint.bodies, "inertia" if turns else "mass"), size))
+
+    def contact(self):
+        """Of a ball with a plane of the ground, another ball or the inside of one."""
+        rng, f = self.rng, self.family
+        found = self.two_points()
+        if not found:
+            return None
+        (i, j), points, length = found
+        fields = {"type": "contact", "body1": self.m.poses[i].name, "body2": self.m.poses[j].name,
+                  "point1": points[0], "point2": points[1], "radius2": length * rng.uniform(0, 0.4)}
+        gap = length * rng.uniform(-0.01, 0.3)
+        kind = rng.choice(["plane", "ball", "ring"])
+        if kind == "plane":
+            ends = [add(self.m.poses[k].position if k else f.origin, rotate(self.m.poses[k].turn, p))
+                    for k, p in ((i, points[0]), (j, points[1]))]
+            towards = times(1 / length, sub(ends[1], ends[0]))
+            fields["point1"] = unrotate(self.m.poses[i].turn, sub(
+                add(ends[0], times(length - fields["radius2"] - gap, towards)), self.m.poses[i].position if i else f.origin))
+            fields["normal1"] = unrotate(self.m.poses[i].turn, towards)
+        elif kind == "ball":
+            fields["radius1"] = max(0.0, length - gap - fields["radius2"])
+        else:
+            fields |= {"radius1": length + abs(gap) + fields["radius2"], "inside": True}
+        return fields | self.one_sided_spring(self.least((i, j), "mass"), length)
+
+    def switched(self):
+        """A torque that begins at a time, or changes where a rate or an angle passes a value."""
+        rng, f = self.rng, self.family
+        pose = rng.choice(self.m.poses[1:])
+        size = self.least((self.m.poses.index(pose),), "inertia") / f.time**2
+        amount = size * rng.uniform(-0.5, 0.5)
+        joints = self.turning()
+        if joints and (f.has("equilibrium") or rng.random() < 0.6):
+            joint = rng.choice(joints)
+            name = self.sensor({"quantity": "angle", "joint": joint.name})
+            where = Formula(name + " - {}", joint.angle + rng.uniform(-0.3, 0.3))
+        elif f.has("equilibrium"):
+            return None
+        else:
+            where = Formula("t - {}", rng.uniform(0.1, 0.9) * f.end_time)
+        d = self.sensor({"quantity": "expression", "value": where})
+        component = rng.choice([Formula("{}*(1 + abs(" + d + ")/" + d + ")", amount), Formula("{}*abs(" + d + ")", amount),
+                                Formula("{}*max(0, " + d + ")^1.5", amount),
+                                Formula("{}*table(" + d + ", [-1, 0, 0.2, 1], [0, 0, 1, 2])", amount)])
+        components = [0, 0, component]
+        rng.shuffle(components)
+        return {"type": "torque", "body": pose.name, "components": components}
 
     def hold_everything(self):
         """An equilibrium exists for sure where every body is held; only then is one worth asking for."""

@@ -43,14 +43,22 @@ Scene with_law(Scene s, const std::string& law) {
 TEST_CASE("a force that jumps when a parameter says so is a warning by both names, with the time and the size",
           "[gradient]") {
   const std::string type = GENERATE(as<std::string>{}, "dopri5", "radau5", "cvodes_adams");
-  const char* const jumps[] = {"1 + abs(t - tp)/(t - tp)", "(t - tp)/sqrt((t - tp)^2)", "2*max(0, t - tp)/(t - tp)",
-                               "2*atan(1/(t - tp))/pi",    "2*atan2(0, tp - t)/pi",     "abs(t - tp)*(t - tp)^(-1)",
-                               "(t - tp)/abs(t - tp)"};
-  for (const char* law : jumps) {
+  const std::pair<const char*, bool> jumps[] = {
+      // and whether gradients follow the instant
+      {"1 + abs(t - tp)/(t - tp)", true}, {"(t - tp)/sqrt((t - tp)^2)", true}, {"2*max(0, t - tp)/(t - tp)", true},
+      {"2*atan(1/(t - tp))/pi", false},   {"2*atan2(0, tp - t)/pi", false},    {"abs(t - tp)*(t - tp)^(-1)", true},
+      {"(t - tp)/abs(t - tp)", true}};
+  for (const auto& [law, followed] : jumps) {
     Scene s = turned_bar(law);
     s.simulation.integrator.type = type;
     const std::vector<std::string> said = warnings(s);
     INFO(type << ", " << law);
+    if (followed && type != "cvodes_adams") {
+      CHECK(said.empty());
+      s.simulation.follows_kinks = false;
+      CHECK(warnings(s).size() == 1);
+      continue;
+    }
     REQUIRE(said.size() == 1);
     CHECK_THAT(said[0], Contains("the law of force 'push' jumps by 2 at t = 0.4 s") && Contains("depends on 'tp'"));
   }
@@ -59,6 +67,8 @@ TEST_CASE("a force that jumps when a parameter says so is a warning by both name
 TEST_CASE("a jump at an angle is a warning that the motion moves its instant", "[gradient]") {
   Scene s = with_law(turned_bar("0"), "-0.1*abs(angle - 0.2)/(angle - 0.2)");  // from 0.1 on
   s.conditions = {value_of("theta", "a"), rate_of("theta", "0.5")};
+  CHECK(warnings(s).empty());
+  s.simulation.follows_kinks = false;
   const std::vector<std::string> said = warnings(s);
   REQUIRE(said.size() == 1);
   CHECK_THAT(said[0], Contains("the law of force 'catch' jumps by 0.2") && Contains("depends on the motion"));
@@ -69,6 +79,7 @@ TEST_CASE("a later jump is a warning of its own if it depends on another paramet
                     again = "abs(t - 2*tp)/(t - 2*tp)";
   Scene s = turned_bar("0.01*(" + passed + " + " + timed + " + " + again + ")");
   s.conditions = {value_of("theta", "0"), rate_of("theta", "-3")};
+  s.simulation.follows_kinks = false;
   const std::vector<std::string> said = warnings(s);
   for (const std::string& w : said) UNSCOPED_INFO(w);
   REQUIRE(said.size() == 2);
@@ -83,6 +94,9 @@ TEST_CASE("a drive whose acceleration jumps when a parameter says so is a warnin
   drive.name = "motor", drive.type = "angle", drive.joint = "A",
   drive.law = Expression::parse("0.1 + max(0, t - tp)^2");
   s.drives = {drive};
+  s.simulation.solve = Solve::dynamics;
+  CHECK(warnings(s).empty());
+  s.simulation.solve = Solve::automatic;  // solved: nothing follows the instant
   const std::vector<std::string> said = warnings(s);
   REQUIRE(said.size() == 1);
   CHECK_THAT(said[0], Contains("the acceleration of drive 'motor' jumps by 2 at t = 0.4 s") && Contains("'tp'"));
@@ -127,6 +141,8 @@ TEST_CASE("a kink that the motion crosses is noted with its instant, and smooth 
   for (const Case& c : cases) {
     Scene s = with_law(turned_bar("0"), c.law);
     s.conditions = {value_of("theta", "0"), rate_of("theta", "0.5")};
+    CHECK(simulate_tlm(Mechanism(s, nominal(s)), s.simulation).statistics.jumps.empty());
+    s.simulation.follows_kinks = false;
     const SimulationResult run = simulate_tlm(Mechanism(s, nominal(s)), s.simulation);
     INFO(c.law << ": " << run.message);
     REQUIRE(run.ok());

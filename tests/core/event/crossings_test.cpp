@@ -1,0 +1,265 @@
+// Runs across kinks and jumps against closed forms, and their gradients.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "core/event/switches.hpp"
+#include "core/simulate/simulation.hpp"
+#include "tests/core/integrate/state_costs.hpp"
+#include "tests/core/mechanism/small_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+struct SensorCost final : PointCost {
+  const Mechanism mechanism;
+  int sensor;
+  SensorCost(const Mechanism& m, const std::string& name) : mechanism(m), sensor(m.sensor(name)) {}
+  double value(const StatePoint& at) const override { return mechanism.sensor_value(sensor, at); }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    return mechanism.add_sensor_gradient(sensor, at, scale, y_bar, rho_bar);
+  }
+};
+
+Sensor quantity(const std::string& name, const std::string& what, const std::string& component) {
+  Sensor s;
+  s.name = name, s.quantity = what, s.body = "block", s.component = component;
+  return s;
+}
+
+// A block of 1 kg on a rail at x = 0 that moves at `vi`, with a force along the rail.
+Scene block(const std::vector<std::pair<std::string, double>>& parameters, const std::string& force) {
+  Scene s;
+  add_parameters(s, parameters);
+  s.gravity = {0.0, 0.0, 0.0};
+  Body b;
+  b.name = "block", b.mass = 1.0, b.inertia = {0.1, 0.1, 0.1, 0.0, 0.0, 0.0};
+  s.bodies.push_back(b);
+  Joint rail;
+  rail.name = "rail", rail.type = "translational", rail.body2 = "block";
+  rail.axis1 = rail.axis2 = vec("1", "0", "0");
+  s.joints.push_back(rail);
+  s.sensors = {quantity("x", "position", "x"), quantity("v", "velocity", "x")};
+  PointForce load;
+  load.body = "block", load.components = {f(force), f("0"), f("0")};
+  s.forces.push_back({"push", load});
+  s.conditions = {value_of("x", "0"), rate_of("x", "vi")};
+  s.simulation.integrator.rtol = 1e-11, s.simulation.integrator.atol = 1e-13;
+  return s;
+}
+
+std::vector<Cost> costs_of(const Mechanism& mechanism) {
+  std::vector<Cost> costs(2);
+  costs[0].terminal = std::make_shared<SensorCost>(mechanism, "x");
+  costs[1].terminal = std::make_shared<SensorCost>(mechanism, "v");
+  return costs;
+}
+
+// (x, v) at the end as a function of the parameters.
+using ClosedForm = VectorXd (*)(const VectorXd& rho);
+
+MatrixXd slopes(ClosedForm f, const VectorXd& rho) {
+  MatrixXd J(2, rho.size());
+  for (Eigen::Index k = 0; k < rho.size(); ++k) {
+    const double h = 1e-3 * std::abs(rho(k));
+    const auto at = [&](double steps) {
+      VectorXd there = rho;
+      there(k) += steps * h;
+      return f(there);
+    };
+    J.col(k) = (45 * (at(1) - at(-1)) - 9 * (at(2) - at(-2)) + at(3) - at(-3)) / (60 * h);
+  }
+  return J;
+}
+
+void check_closed_form(Scene scene, ClosedForm exact) {
+  const auto [type, model] =
+      GENERATE(std::pair("dopri5", ModelChoice::planar), std::pair("dopri5", ModelChoice::spatial),
+               std::pair("dopri853", ModelChoice::planar), std::pair("dopri853", ModelChoice::spatial),
+               std::pair("radau5", ModelChoice::spatial), std::pair("sdirk4", ModelChoice::spatial),
+               std::pair("rodas4", ModelChoice::spatial));
+  scene.simulation.integrator.type = type;
+  scene.simulation.model = model;
+  const VectorXd rho = nominal(scene);
+  const Mechanism mechanism(scene, rho);
+  const std::vector<Cost> costs = costs_of(mechanism);
+  const SimulationResult tlm = simulate_tlm(mechanism, scene.simulation, costs);
+  const SimulationResult adjoint = simulate_adjoint(mechanism, scene.simulation, costs);
+  INFO(type << (model == ModelChoice::planar ? ", planar: " : ", spatial: ") << tlm.message << adjoint.message);
+  REQUIRE((tlm.ok() && adjoint.ok()));
+  CHECK((tlm.psi - exact(rho)).cwiseAbs().maxCoeff() < 1e-8);
+  CHECK(tlm.psi == adjoint.psi);
+  const MatrixXd J = slopes(exact, rho);
+  INFO("exact\n" << J << "\nby tlm\n" << tlm.psi_rho);
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    const double size = J.row(i).cwiseAbs().maxCoeff();
+    CHECK((tlm.psi_rho - J).row(i).cwiseAbs().maxCoeff() < 1e-7 * size);
+    CHECK((tlm.psi_rho - adjoint.psi_rho).row(i).cwiseAbs().maxCoeff() < 1e-11 * size);
+  }
+  CHECK(tlm.statistics.jumps.empty());
+}
+
+// rho = (c, vi, K, gap); the run ends at 0.07 s, in contact.
+VectorXd inside_kelvin_voigt(const VectorXd& rho) {
+  const double c = rho(0), vi = rho(1), K = rho(2), gap = rho(3), s = 0.07 - gap / vi, w = std::sqrt(K - c * c / 4);
+  const double e = std::exp(-c * s / 2), d = vi * e * std::sin(w * s) / w;
+  return Eigen::Vector2d(gap + d, vi * e * std::cos(w * s) - c / 2 * d);
+}
+
+// rho = (f, vi, ts): a force f from ts on, until 0.5 s.
+VectorXd switched_on(const VectorXd& rho) {
+  const double s = 0.5 - rho(2);
+  return Eigen::Vector2d(0.5 * rho(1) + 0.5 * rho(0) * s * s, rho(1) + rho(0) * s);
+}
+
+// rho = (f, vi, place): a force -f beyond a place.
+VectorXd slowed_down(const VectorXd& rho) {
+  const double s = 0.5 - rho(2) / rho(1);
+  return Eigen::Vector2d(0.5 * rho(1) - 0.5 * rho(0) * s * s, rho(1) - rho(0) * s);
+}
+
+}  // namespace
+
+TEST_CASE("a stop whose damper begins with a jump has exact gradients within the contact", "[events]") {
+  Scene s = block({{"c", 15}, {"vi", 1.7}, {"K", 9000}, {"gap", 0.08}},
+                  "-(abs(x - gap)/(x - gap) + 1)/2*(K*(x - gap) + c*v)");
+  s.simulation.end_time = 0.07;
+  check_closed_form(s, inside_kelvin_voigt);
+}
+
+TEST_CASE("a force that begins at a time has exact gradients in this time", "[events]") {
+  const std::string law =
+      GENERATE(as<std::string>{}, "f*(1 + abs(t - ts)/(t - ts))/2", "f*(1 + (t - ts)/abs(t - ts))/2",
+               "f*max(0, t - ts)/(t - ts)", "f*(1 + (t - ts)/sqrt((t - ts)^2))/2");
+  INFO(law);
+  Scene s = block({{"f", 3}, {"vi", 0.4}, {"ts", 0.2}}, law);
+  s.simulation.end_time = 0.5;
+  check_closed_form(s, switched_on);
+}
+
+TEST_CASE("a force that begins at a place has exact gradients in this place", "[events]") {
+  const std::string law =
+      GENERATE(as<std::string>{}, "-f*(1 + abs(x - place)/(x - place))/2", "-f*max(0, x - place)/(x - place)");
+  INFO(law);
+  Scene s = block({{"f", 1.1}, {"vi", 0.9}, {"place", 0.15}}, law);
+  s.simulation.end_time = 0.5;
+  check_closed_form(s, slowed_down);
+}
+
+TEST_CASE("the sides, the events and the grid of fixed steps", "[events]") {
+  Scene s = block({{"vi", 0.9}}, "-2000*max(0, x - 0.151)");
+  s.simulation.end_time = 0.5;
+  s.simulation.integrator.type = "rk4", s.simulation.integrator.step = 1e-2;
+  const Mechanism mechanism(s, nominal(s));
+  const SimulationResult run = simulate(mechanism, s.simulation);
+  REQUIRE(run.ok());
+  REQUIRE(run.steps.sides.size() == 1);
+  const int before = run.steps.sides[0];
+  REQUIRE(run.steps.events.size() == 2);
+  CHECK(run.steps.events[0].after == -before);
+  CHECK(run.steps.events[1].after == before);
+  const auto end_of = [&](std::size_t i) { return run.steps.times[i] + run.steps.sizes[i]; };
+  CHECK(end_of(run.steps.events[0].step) == Approx(0.151 / 0.9).epsilon(1e-12));
+  CHECK(run.steps.sizes.size() == 52);  // two more than 50
+  for (int k = 1; k <= 50; ++k) {
+    INFO(k);
+    bool found = false;
+    for (std::size_t i = 0; i < run.steps.sizes.size(); ++i) found = found || std::abs(end_of(i) - 0.01 * k) < 1e-12;
+    CHECK(found);
+  }
+  RunOptions frozen;
+  frozen.frozen = &run.steps;
+  const SimulationResult again = simulate(mechanism, s.simulation, {}, {}, frozen);
+  CHECK(again.y_end == run.y_end);
+}
+
+TEST_CASE("two contacts within one step are found", "[events]") {
+  Scene s = block({{"vi", 0.9}}, "-4 - 50000*max(0, x - 0.101248)");
+  s.simulation.end_time = 0.4;
+  s.simulation.integrator.type = "rk4", s.simulation.integrator.step = 0.4;
+  const SimulationResult run = simulate(Mechanism(s, nominal(s)), s.simulation);
+  REQUIRE(run.ok());
+  CHECK(run.steps.events.size() == 2);  // x = 0.9 t - 2 t^2 comes to 0.10125
+}
+
+TEST_CASE("without a side that leads away from it, a switch is held no more", "[events]") {
+  Scene s = block({{"vi", 0.3}}, "-2*abs(v)/v");  // Coulomb's friction, at rest from 0.15 s on
+  s.simulation.end_time = 0.2;
+  s.simulation.integrator.rtol = 1e-6, s.simulation.integrator.atol = 1e-6;
+  const Mechanism mechanism(s, nominal(s));
+  const SimulationResult run = simulate_tlm(mechanism, s.simulation, costs_of(mechanism));
+  INFO(run.message);
+  REQUIRE(run.ok());
+  CHECK(run.psi(0) == Approx(0.0225).epsilon(1e-5));
+  CHECK(run.steps.events.back().after == 0);
+  CHECK(!run.statistics.jumps.empty());
+}
+
+namespace {
+
+// Two bars on hinges that swing between stops, with a torque that begins at a time and one that changes at an angle.
+Scene swinging_bars() {
+  Scene s = double_pendulum();
+  add_parameters(s, {{"k", 900}, {"stop", 0.35}, {"ts", 0.31}, {"push", 1.5}, {"turn", -0.2}, {"l", 0.4}});
+  s.gravity = {0.0, -9.81, 0.0};
+  for (const char* joint : {"A", "B"}) {
+    Rsda stop;
+    stop.joint = joint, stop.law = f("k*max(0, angle - stop) - k*max(0, -stop - angle) + 0.1*rate");
+    s.forces.push_back({std::string("stop ") + joint, stop});
+  }
+  s.sensors.push_back(angle_sensor("a", s.joints[0].name));
+  Torque motor;
+  motor.body = s.bodies[0].name;
+  motor.components = {f("0"), f("0"), f("push*(1 + abs(t - ts)/(t - ts))/2 + l*abs(a - turn)/(a - turn)")};
+  s.forces.push_back({"motor", motor});
+  s.simulation.end_time = 1.2;
+  s.simulation.integrator.rtol = 1e-11, s.simulation.integrator.atol = 1e-12;
+  return s;
+}
+
+}  // namespace
+
+TEST_CASE("gradients through many events are those of free runs, by both sweeps and with little memory", "[events]") {
+  Scene s = swinging_bars();
+  const auto [type, model] =
+      GENERATE(std::pair("dopri853", ModelChoice::planar), std::pair("dopri853", ModelChoice::spatial),
+               std::pair("radau5", ModelChoice::spatial));
+  s.simulation.integrator.type = type, s.simulation.model = model;
+  if (s.simulation.integrator.type == "radau5") s.simulation.integrator.rtol = 1e-9;
+  const VectorXd rho = nominal(s);
+  const Mechanism mechanism(s, rho);
+  Cost cost;
+  cost.terminal = std::make_shared<StateNorm>();
+  cost.samples = {{0.7, std::make_shared<StateNorm>()}};
+  const std::vector<Cost> costs{cost};
+  const SimulationResult tlm = simulate_tlm(mechanism, s.simulation, costs);
+  INFO(tlm.message);
+  REQUIRE(tlm.ok());
+  CHECK(tlm.steps.events.size() > 4);
+  SimulationSettings small = s.simulation;
+  small.adjoint_memory_mib = 1e-3;
+  const double size = tlm.psi_rho.cwiseAbs().maxCoeff();
+  for (const SimulationSettings& settings : {s.simulation, small}) {
+    const SimulationResult adjoint = simulate_adjoint(mechanism, settings, costs);
+    REQUIRE(adjoint.ok());
+    CHECK((adjoint.psi_rho - tlm.psi_rho).cwiseAbs().maxCoeff() < 1e-10 * size);
+    if (settings.adjoint_memory_mib < 1) CHECK(adjoint.statistics.recomputed_steps > 0);
+  }
+  for (Eigen::Index k = 0; k < rho.size(); ++k) {
+    const double h = 1e-4 * std::max(std::abs(rho(k)), 0.1);
+    const auto psi = [&](double steps) {
+      VectorXd there = rho;
+      there(k) += steps * h;
+      const SimulationResult run = simulate(Mechanism(s, there), s.simulation, costs);
+      INFO(run.message);
+      REQUIRE(run.ok());
+      return run.psi(0);
+    };
+    const double difference = (8 * (psi(1) - psi(-1)) - (psi(2) - psi(-2))) / (12 * h);
+    INFO(s.parameters[static_cast<std::size_t>(k)].name);
+    CHECK(tlm.psi_rho(0, k) == Approx(difference).epsilon(2e-6).margin(2e-6 * size));
+  }
+}
