@@ -60,6 +60,9 @@ Json to_json(const SimulationStatistics& statistics) {
     json["stability_limited_steps"] = statistics.stability_limited_steps;
     if (statistics.stability_limited_steps > 0) json["fastest_rate"] = statistics.stiffest_rate;
   }
+  for (const ImpactEvent& impact : statistics.impacts)
+    json["events"].push_back(
+        {{"name", impact.name}, {"time", impact.time}, {"kind", "impact"}, {"impulse", impact.impulse}});
   if (statistics.kinks > 0) json["kinks"] = statistics.kinks;
   if (statistics.adjoint_memory_bytes > 0) {
     json["adjoint_memory_bytes"] = statistics.adjoint_memory_bytes;

@@ -16,6 +16,8 @@ constexpr double kOfTolerance = 1e-3;  // what an instant may add to the error o
 constexpr double kLeastPart = 1e-13;   // of a step: its instants have digits for it
 constexpr double kSlopePart = 1e-4;    // of a step: the root of the digits left by differences
 constexpr double kNearStart = 0.125;   // the next part to look at between a start at zero and a point beyond
+constexpr double kResidual = 4;        // times the value at an event: the next step begins so far on either side
+constexpr double kJumped = 1e-6;       // of a value: what the motion changes at an instant is less
 constexpr int kMostTries = 12;         // sizes for one event; Newton's method takes three
 constexpr int kMostBisections = 60;
 constexpr int kMostParabolas = 6;
@@ -35,16 +37,20 @@ CrossingSearch::CrossingSearch(Switches& switches, const SimulationSettings& set
   rho_bar_.setZero(switches.mechanism().parameters());
 }
 
-void CrossingSearch::begin(const StatePoint& start) {
+std::optional<std::size_t> CrossingSearch::begin(const StatePoint& start) {
+  std::optional<std::size_t> passed;
   for (std::size_t k = 0; k < watched_.size(); ++k) {
     Watched& w = watched_[k];
     w = {};
     set_sizes(k, start);
     w.start = switches_.value(k, {start.t, start.y, start.angles, motion_});
-    switches_.hold(k, std::isnan(w.start) ? 0 : w.start < 0 ? -1 : 1);
+    switches_.hold(k, switches_.is_limit(k) ? 1 : std::isnan(w.start) ? 0 : w.start < 0 ? -1 : 1);
+    set_noise(w, start.y);
+    if (switches_.is_limit(k) && w.start < -w.noise) passed = k;
   }
   target_ = {};
   root_ = {};
+  return passed;
 }
 
 // The sums of the derivatives, whose products with the sizes of positions and velocities bound the rounding.
@@ -67,14 +73,19 @@ double CrossingSearch::value_at(const Step& step, std::size_t k, double part) {
   return switches_.side(k) * switches_.value(k, {step.t + part * step.h, y_, step.angles0, motion_});
 }
 
+void CrossingSearch::set_noise(Watched& w, const Eigen::VectorXd& y) {
+  const Eigen::Index half = y.size() / 2;
+  w.noise = kRounding * kEpsilon *
+            (w.of_positions * y.head(half).lpNorm<Eigen::Infinity>() +
+             w.of_velocities * y.tail(half).lpNorm<Eigen::Infinity>() + w.of_others);
+}
+
 void CrossingSearch::evaluate(const Step& step) {
-  const Eigen::Index half = step.y1.size() / 2;
-  const double positions = step.y1.head(half).lpNorm<Eigen::Infinity>(),
-               velocities = step.y1.tail(half).lpNorm<Eigen::Infinity>();
   for (std::size_t k = 0; k < watched_.size(); ++k) {
     Watched& w = watched_[k];
     w.values[0] = switches_.side(k) * w.start;
-    w.noise = kRounding * kEpsilon * (w.of_positions * positions + w.of_velocities * velocities + w.of_others);
+    set_noise(w, step.y1);
+    if (w.changed == step.t) w.noise += kResidual * std::abs(w.start);
   }
   for (int p = 1; p < kPoints; ++p) {
     const bool at_end = p + 1 == kPoints;
@@ -235,6 +246,10 @@ const CrossingSearch::Verdict& CrossingSearch::look_at(const Step& step, double 
   const bool passed = first < INFINITY;
   if (!passed && target_.tries == 0) return verdict_;
   if (passed && first * step.h <= shortest(step)) {
+    if (switches_.is_limit(of)) {
+      verdict_.rests = of;
+      return verdict_;
+    }
     Watched& w = watched_[of];
     verdict_.at_start.push_back({0, of, switches_.side(of), w.changed == step.t ? 0 : -switches_.side(of)});
     w.changed = step.t;
@@ -276,7 +291,7 @@ void CrossingSearch::set_changes(const Step& step, std::size_t of, double near) 
     const double end = w.values[kPoints - 1], change = end - value_at(step, k, 1 - kSlopePart);
     const bool is_zero = std::abs(end) <= w.noise + 2 * near / (kSlopePart * step.h) * std::abs(change);
     if (k != of && !(is_zero && change < -w.noise)) continue;
-    changes_.push_back({0, k, switches_.side(k), -switches_.side(k)});
+    changes_.push_back({0, k, switches_.side(k), switches_.is_limit(k) ? 1 : -switches_.side(k)});
     w.changed = step.t1;
   }
 }
@@ -294,6 +309,24 @@ const std::vector<SwitchEvent>& CrossingSearch::advance(const Step& step, double
   }
   target_ = {};
   return changes_;
+}
+
+std::optional<SwitchEvent> CrossingSearch::driven(const StatePoint& at) {
+  for (std::size_t k = 0; k < watched_.size(); ++k) {
+    Watched& w = watched_[k];
+    const int side = switches_.side(k);
+    if (side == 0 || switches_.is_limit(k) || w.changed == at.t) continue;
+    if (!(side * switches_.value(k, {at.t, at.y, at.angles, motion_}) < -kJumped * std::abs(w.start) - w.noise))
+      continue;
+    w.changed = at.t;
+    return SwitchEvent{0, k, side, -side};
+  }
+  return std::nullopt;
+}
+
+void CrossingSearch::restart(const StatePoint& at) {
+  for (std::size_t k = 0; k < watched_.size(); ++k)
+    watched_[k].start = switches_.value(k, {at.t, at.y, at.angles, motion_});
 }
 
 bool CrossingSearch::ends_at_time() const {

@@ -26,20 +26,25 @@ class CrossingSearch {
  public:
   CrossingSearch(Switches& switches, const SimulationSettings& settings, MotionSource* motion);
 
-  // Chooses the sides of all switches.
-  void begin(const StatePoint& start);
+  // Chooses the sides of all switches. Returns a limit that is passed there.
+  std::optional<std::size_t> begin(const StatePoint& start);
 
   struct Verdict {
     std::optional<double> size;         // at which to try the step again
     std::vector<SwitchEvent> at_start;  // changes where the step begins, after which to try it again
+    std::optional<std::size_t> rests;   // a limit that is struck again where the step begins
   };
   // The error of a step of size h from t, in tolerances, with that of its derivatives.
   double with_derivatives(double t, double h, double error);
   // Of a step that the error allows.
   const Verdict& look_at(const Step& step, double error);
+  void forget() { target_ = {}; }  // a step was rejected: its instants are sought anew
   // The step that was looked at last stays, and the next one begins at `next`. Returns the changes between them.
   const std::vector<SwitchEvent>& advance(const Step& step, double next);
-  bool ends_at_time() const;  // of a switch of time, at which functions of time need have no value
+  // After changes at a state: a switch that jumps with them to its other side, if there is one.
+  std::optional<SwitchEvent> driven(const StatePoint& at);
+  void restart(const StatePoint& at);  // the next step begins there, after all changes
+  bool ends_at_time() const;           // of a switch of time, at which functions of time need have no value
   void changed(const SwitchEvent& event, double t);  // the switch is held on its new side from t on
 
  private:
@@ -53,6 +58,7 @@ class CrossingSearch {
   };
 
   void set_sizes(std::size_t k, const StatePoint& at);
+  static void set_noise(Watched& w, const Eigen::VectorXd& y);
   void evaluate(const Step& step);
   double value_at(const Step& step, std::size_t k, double part);
   double zero_between(const Step& step, std::size_t k, double from, double f_from, double to, double f_to);

@@ -27,8 +27,31 @@ bool is_same(const Program& a, const Program& b) {
 
 Switches::Switches(const Mechanism& mechanism, std::span<const Cost> costs, const SimulationSettings& settings)
     : given_(mechanism), given_costs_(costs), held_(mechanism) {
-  if (!settings.follows_kinks) return;
   const MechanismData& d = mechanism.data();
+  for (const LimitData& limit : d.limits) {
+    const SensorPtr gap = expression_sensor(d, limit.gap);
+    switches_.push_back({limit.gap, Inputs::sensors, {}, gap, 1, {}, &limit, gap->rate(d)});
+  }
+  of_mechanism_ = switches_.size();
+  if (settings.follows_kinks) add_programs(settings);
+  add_decisions();
+  if (switches_.empty()) return;
+  own_ = std::make_shared<MechanismData>(d);
+  own_->forces = std::make_shared<Forces>(*d.forces);
+  held_ = Mechanism(own_);
+  const auto rebind = [&](std::shared_ptr<const PointCost>& cost) {
+    if (std::shared_ptr<const PointCost> bound = cost ? cost->bound_to(held_, nullptr) : nullptr) cost = bound;
+  };
+  own_costs_.assign(costs.begin(), costs.end());
+  for (Cost& cost : own_costs_) {
+    rebind(cost.running);
+    rebind(cost.terminal);
+    for (SampledCost& sample : cost.samples) rebind(sample.cost);
+  }
+}
+
+void Switches::add_programs(const SimulationSettings& settings) {
+  const MechanismData& d = given_.data();
   const int P = static_cast<int>(d.rho.size());
   d.forces->for_each([&]<class Kind>(const Kind& f, ForcePlace place) {
     if constexpr (HasLaw<Kind>) {
@@ -58,23 +81,10 @@ Switches::Switches(const Mechanism& mechanism, std::span<const Cost> costs, cons
     });
   }
   of_mechanism_ = switches_.size();
-  for (std::size_t o = 0; o < costs.size(); ++o)
-    if (const SwitchedProgram* const g = costs[o].running ? costs[o].running->program() : nullptr)
+  for (std::size_t o = 0; o < given_costs_.size(); ++o)
+    if (const SwitchedProgram* const g = given_costs_[o].running ? given_costs_[o].running->program() : nullptr)
       add(g->program, Inputs::sensors, {}, P,
           [this, o](const Program& p) { own_costs_[o].running = given_costs_[o].running->bound_to(held_, &p); });
-  if (switches_.empty()) return;
-  own_ = std::make_shared<MechanismData>(d);
-  own_->forces = std::make_shared<Forces>(*d.forces);
-  held_ = Mechanism(own_);
-  const auto rebind = [&](std::shared_ptr<const PointCost>& cost) {
-    if (std::shared_ptr<const PointCost> bound = cost ? cost->bound_to(held_, nullptr) : nullptr) cost = bound;
-  };
-  own_costs_.assign(costs.begin(), costs.end());
-  for (Cost& cost : own_costs_) {
-    rebind(cost.running);
-    rebind(cost.terminal);
-    for (SampledCost& sample : cost.samples) rebind(sample.cost);
-  }
 }
 
 void Switches::add(const Program& program, Inputs of, ForcePlace force, int time,
@@ -90,12 +100,27 @@ void Switches::add(const Program& program, Inputs of, ForcePlace force, int time
   sites_.push_back(std::move(site));
 }
 
+// A decision may depend on others, as of max(0, x + abs(t - ts)/(t - ts)). It jumps where they change.
+void Switches::add_decisions() {
+  for (std::size_t k = 0; k < switches_.size(); ++k) {
+    const Switch& s = switches_[k];
+    if (s.limit) continue;
+    const auto function = std::make_shared<const Program>(s.function);
+    decisions_.push_back(function);
+    const int P = static_cast<int>(given_.rho().size());
+    add(*function, s.of, s.force, s.of == Inputs::law ? P + 2 : P, [this, k](const Program& p) {
+      Switch& changed = switches_[k];
+      changed.sensor = changed.of == Inputs::law ? law_sensor(changed.force, p) : expression_sensor(given_.data(), p);
+    });
+  }
+}
+
 // Equal functions are one switch, and so are those of opposite sign.
 std::size_t Switches::index_of(Branching& branching, Inputs of, ForcePlace force) {
   const Program opposite = negative_of(branching.decision);
   for (std::size_t k = 0; k < switches_.size(); ++k) {
     const Switch& s = switches_[k];
-    if (s.of != of || (of == Inputs::law && !(s.force == force))) continue;
+    if (s.limit || s.of != of || (of == Inputs::law && !(s.force == force))) continue;
     const bool same = is_same(s.function, branching.decision);
     if (!same && !is_same(s.function, opposite)) continue;
     branching.sign = same ? 1 : -1;
@@ -103,7 +128,7 @@ std::size_t Switches::index_of(Branching& branching, Inputs of, ForcePlace force
   }
   const SensorPtr sensor =
       of == Inputs::law ? law_sensor(force, branching.decision) : expression_sensor(given_.data(), branching.decision);
-  switches_.push_back({branching.decision, of, force, sensor, 0, {}});
+  switches_.push_back({branching.decision, of, force, sensor});
   return switches_.size() - 1;
 }
 
@@ -125,6 +150,20 @@ double Switches::add_gradient(std::size_t k, const StatePoint& at, double scale,
   const double value = switches_[k].sensor->evaluate(given_.data(), at, &to);
   if (reads_motion(k)) at.motion->fold_bar(at, y_bar, rho_bar);
   return value;
+}
+
+double Switches::rate(std::size_t k, const StatePoint& at) const {
+  return switches_[k].rate->evaluate(given_.data(), at, nullptr);
+}
+
+double Switches::add_rate_gradient(std::size_t k, const StatePoint& at, VecOut y_bar, VecOut rho_bar) const {
+  SensorGradient to{given_.data(), 1, y_bar, rho_bar};
+  return switches_[k].rate->evaluate(given_.data(), at, &to);
+}
+
+// The force resists a growing sensor.
+void Switches::push(std::size_t k, double mu) {
+  own_->forces->change_law(limit(k).force, [&](auto& force) { force.law.f0 = -limit(k).sign * mu; });
 }
 
 std::vector<double> Switches::zeros(std::size_t k, double start, double end) const {

@@ -23,6 +23,8 @@
 
 namespace mbsopt {
 
+struct LimitData;
+
 class Switches {
  public:
   // If nothing switches, mechanism() and costs() are those given, and so they are if the run does not follow kinks. The
@@ -39,13 +41,21 @@ class Switches {
   std::size_t of_mechanism() const { return of_mechanism_; }  // those before the ones of costs
   bool reads_motion(std::size_t k) const;                     // accelerations or reactions
   bool is_of_time(std::size_t k) const;                       // and of parameters alone
-  double value(std::size_t k, const StatePoint& at) const;    // of the function, whatever is held
+  // Other switches in the function are held, too.
+  double value(std::size_t k, const StatePoint& at) const;
   // The same with its gradient: y_bar += scale d/dy, rho_bar += scale d/drho, t_bar += scale d/dt.
   double add_gradient(std::size_t k, const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar,
                       double& t_bar) const;
   // The exponent, below 2, of a power or root whose value begins at the zero of the function, on the side that is held;
   // else infinite.
   double root(std::size_t k) const;
+  // A limit is a switch that stays on its positive side. The gap to it, its rate as value(), and a constant force mu
+  // along the gradient of the gap.
+  bool is_limit(std::size_t k) const { return switches_[k].limit != nullptr; }
+  const LimitData& limit(std::size_t k) const { return *switches_[k].limit; }
+  double rate(std::size_t k, const StatePoint& at) const;
+  double add_rate_gradient(std::size_t k, const StatePoint& at, VecOut y_bar, VecOut rho_bar) const;
+  void push(std::size_t k, double mu);
   // The zeros of a switch of time between two instants.
   std::vector<double> zeros(std::size_t k, double start, double end) const;
 
@@ -69,9 +79,13 @@ class Switches {
     ForcePlace force;  // of a law
     SensorPtr sensor;
     int side = 0;
-    std::vector<std::size_t> sites;
+    std::vector<std::size_t> sites = {};
+    const LimitData* limit = nullptr;
+    SensorPtr rate = nullptr;  // of a limit
   };
+  void add_programs(const SimulationSettings& settings);
   void add(const Program& program, Inputs of, ForcePlace force, int time, std::function<void(const Program&)> replace);
+  void add_decisions();
   std::size_t index_of(Branching& branching, Inputs of, ForcePlace force);
   void rebuild(const Site& site);
 
@@ -82,6 +96,7 @@ class Switches {
   std::vector<Cost> own_costs_;
   std::vector<Switch> switches_;
   std::vector<Site> sites_;
+  std::vector<std::shared_ptr<const Program>> decisions_;  // whose sites these are, too
   std::vector<int> sides_;
   std::size_t of_mechanism_ = 0;
 };

@@ -5,24 +5,12 @@
 //   const Program beyond = with_branches(law, branchings, {1});    // of max(x - gap, 0): x - gap, for any x
 #pragma once
 
-#include <cmath>
 #include <span>
 #include <vector>
 
-#include "core/expression/program.hpp"
+#include "core/expression/branching.hpp"
 
 namespace mbsopt {
-
-struct Branching {
-  std::size_t instruction = 0;
-  double sample = 0;  // of a table
-  Program decision;   // its inputs are those of the program
-  int sign = 1;       // 1, or -1 where the branch follows the opposite sign
-  // The exponent of a power or root that reads the branch and has no values on its other side; if it is below 2, its
-  // second derivative is infinite there. `rises` is the side of the decision on which it varies; 0: on both.
-  double root = INFINITY;
-  int rises = 0;
-};
 
 // The branchings whose decision depends on an input from `parameters` on. Tables of time alone are left out
 // (kink_times.hpp), and so are those with many samples, which follow smooth functions.

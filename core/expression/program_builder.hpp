@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "core/expression/branches.hpp"
+#include "core/expression/branching.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/expression/program.hpp"
 #include "core/expression/syntax_tree.hpp"

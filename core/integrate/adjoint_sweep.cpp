@@ -247,8 +247,42 @@ bool AdjointSweep::implicit_back(const StageGroup& g) {
   return true;
 }
 
-void AdjointSweep::cross_back(Switches& switches, const SwitchEvent& event, const StatePoint& at) {
-  if (!set_event(switches, event, at, true)) return;
+// The transpose of TangentSweep::cross_limit.
+void AdjointSweep::cross_limit_back(Switches& switches, const SwitchEvent& event, const StatePoint& at) {
+  if (!set_strike(switches, event, at)) return;
+  const auto& [impact, f_before, f_after, r_y, r_rho, c_y, c_rho, e, slot_e] = strike_;
+  const Eigen::Index n = impact.w.size();
+  std::vector<double> kappa;
+  Eigen::MatrixXd w_bar(n, static_cast<Eigen::Index>(bars_.size()));
+  for (Bars& b : bars_) {
+    kappa.push_back(event_.jump_of_costs(b.objective) - f_after.dot(b.lambda));
+    const double L_bar = impact.w.dot(b.lambda.tail(n)) / impact.c;
+    w_bar.col(b.objective) = impact.Ln * (b.lambda.tail(n) - L_bar * c_y.tail(n));
+    b.lambda.head(n) -= impact.Ln * L_bar * c_y.head(n);
+    b.lambda -= (1 + e) * L_bar * r_y;
+    b.rho -= impact.Ln * L_bar * c_rho + (1 + e) * L_bar * r_rho;
+    if (slot_e >= 0) b.theta(slot_e) -= impact.r * L_bar;
+  }
+  for (const double sign : {1.0, -1.0}) {
+    const bool linearised = linearise_pushed(switches, event, at, sign * impact.mu);
+    for (Bars& b : bars_) {
+      if (!linearised) break;
+      w_.setZero();
+      w_.tail(n) = sign / (2 * impact.mu) * w_bar.col(b.objective);
+      dynamics_.add_adjoint(w_, b.lambda, b.theta, b.rho);
+    }
+    switches.push(event.of, 0);
+  }
+  for (Bars& b : bars_) {
+    const double k = (kappa[static_cast<std::size_t>(b.objective)] + f_before.dot(b.lambda)) / event_.rate;
+    b.lambda -= k * event_.g_y;
+    b.rho -= k * event_.g_rho;
+  }
+}
+
+void AdjointSweep::cross_back(Switches& switches, const SwitchEvent& event, std::size_t first, const StatePoint& at) {
+  if (switches.is_limit(event.of)) return cross_limit_back(switches, event, at);
+  if (!set_event(switches, event, first, at, true)) return;
   for (Bars& b : bars_) {
     const double kappa = (event_.jump.dot(b.lambda) + event_.jump_of_costs(b.objective)) / event_.rate;
     b.lambda -= kappa * event_.g_y;

@@ -20,7 +20,7 @@ class AdjointSweep : public Sweep {
 
   bool step_back(const StoredStep& step);
   // Moves the cotangents from after an event to before it (sweep.hpp).
-  void cross_back(Switches& switches, const SwitchEvent& event, const StatePoint& at);
+  void cross_back(Switches& switches, const SwitchEvent& event, std::size_t first, const StatePoint& at);
   // lambda at the current time, 14n x objectives; and d psi/d rho of all that was swept, parameters x objectives
   // (without the dependence of the initial state).
   Eigen::MatrixXd lambda() const;
@@ -30,6 +30,7 @@ class AdjointSweep : public Sweep {
   double magnification(const Eigen::VectorXd& psi) const;
 
  private:
+  void cross_limit_back(Switches& switches, const SwitchEvent& event, const StatePoint& at);
   // The cotangents of one objective.
   struct Bars {
     Eigen::Index objective;

@@ -39,6 +39,11 @@ class Checkpoints : private StepObserver {
   // Computes the steps from a snapshot to `last` (not included) again, and shows each to an observer. Returns whether
   // it succeeds.
   using Replay = std::function<bool(const Snapshot& from, long last, StepObserver& sink)>;
+  // The state after the last step of a replay, and after an impact that ends it.
+  void set_end(const Eigen::VectorXd& y0, const Eigen::VectorXd& angles) {
+    again_.end.y0 = y0;
+    again_.end.angles = angles;
+  }
   using StepBack = std::function<bool(const StoredStep&)>;
   // Backward: every step, the last one first. False as soon as either function says so.
   bool go_back(const Replay& replay, const StepBack& back);

@@ -80,7 +80,7 @@ void ForwardRun::go(const Sampling& sampling, const RunOptions& options, const F
   RungeKuttaRun(attempt, costs_, options, result_, &switches_, motion())
       .go(assembly_.result().y, assembly_.result().angles, observers);
   std::erase_if(result_.statistics.jumps, [&](const Jump& jump) { return is_event(result_.steps, jump.t); });
-  result_.statistics.kinks = static_cast<long>(result_.steps.events.size());
+  result_.statistics.kinks = static_cast<long>(result_.steps.events.size()) - std::ssize(result_.statistics.impacts);
   quadrature_.add_to(result_.statistics);
   angles_end_ = attempt.step().angles0;
   if (result_.ok() && !followed)

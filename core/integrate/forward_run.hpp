@@ -49,6 +49,9 @@ class ForwardRun : private StepObserver {
   // The values of costs and samples of a step.
   bool reads_inside(double t1) const override { return sampling_->look_inside || schedule_->due(t1); }
   std::string look_at(const SeenStep& step) override;
+  void cross(const SwitchEvent&, const StatePoint&) override {
+    if (motion_) motion_->forget();
+  }
   void add_running_costs(const Step& step);
   StatePoint inside(const Step& step, double t);  // by dense output, until the next call
   void sample(const Step& step);

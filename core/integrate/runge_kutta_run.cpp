@@ -115,7 +115,11 @@ bool RungeKuttaRun::begin(const Eigen::VectorXd& y, const Eigen::VectorXd& angle
   const double t = frozen_ && frozen_index_ < last_ ? frozen_->times[frozen_index_] : settings_.start_time;
   result_.last_good_time = t;
   if (crossings_) {
-    crossings_->begin({t, y, angles});
+    if (const std::optional<std::size_t> passed = crossings_->begin({t, y, angles})) {
+      result_.stop(SimulationStatus::not_credible,
+                   fmt::format("limit '{}' is passed at the start, t = {:.6g} s", switches_->limit(*passed).name, t));
+      return false;
+    }
     result_.steps.sides = switches_->sides();
   } else if (switches_) {
     follow_given_events();
@@ -267,7 +271,13 @@ bool RungeKuttaRun::is_better_placed_elsewhere() {
 // Returns whether to try the step again: up to an event within it, or after one at its start.
 bool RungeKuttaRun::passes_event() {
   if (!crossings_) return false;
-  const auto& [size, at_start] = crossings_->look_at(step_, error_);
+  const auto& [size, at_start, rests] = crossings_->look_at(step_, error_);
+  if (rests)
+    result_.stop(SimulationStatus::not_credible,
+                 fmt::format("limit '{}' comes to rest at t = {:.6g} s: resting contact is not followed. End the run "
+                             "before, or let a force of type contact or stop hold it instead",
+                             switches_->limit(*rests).name, step_.t));
+  if (rests) return true;
   for (SwitchEvent event : at_start) {
     if (result_.statistics.steps > 0) {
       event.step = result_.steps.sizes.size() - 1;
@@ -278,23 +288,46 @@ bool RungeKuttaRun::passes_event() {
       result_.steps.sides = switches_->sides();
     }
   }
-  if (!at_start.empty()) attempt_.restart();
+  if (!at_start.empty()) {
+    if (result_.statistics.steps > 0) cross_driven(step_.t);
+    attempt_.restart();
+  }
   if (!size) return !at_start.empty();
   if (!split_) split_ = h_;
   h_ = *size;
   return true;
 }
 
+// What changes with the changes so far, at the end of the last step.
+void RungeKuttaRun::cross_driven(double t) {
+  const StatePoint at{step_.t, step_.y0, step_.angles0};
+  while (std::optional<SwitchEvent> event = crossings_->driven(at)) {
+    event->step = result_.steps.sizes.size() - 1;
+    result_.steps.events.push_back(*event);
+    cross(*event, t, step_.y0, step_.angles0);
+  }
+  crossings_->restart(at);
+}
+
 void RungeKuttaRun::cross(const SwitchEvent& event, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   for (StepObserver* const observer : observers_) observer->cross(event, {t, y, angles});
   switches_->hold(event.of, event.after);
   if (crossings_) crossings_->changed(event, step_.t);
+  if (!switches_->is_limit(event.of)) return;
+  const std::string& name = switches_->limit(event.of).name;
+  const std::optional<double> impulse = attempt_.strike(*switches_, event.of);
+  if (impulse && !is_part_) result_.statistics.impacts.push_back({name, t, *impulse});
+  if (!impulse)
+    result_.stop(SimulationStatus::not_credible,
+                 fmt::format("limit '{}' is struck at t = {:.6g} s, but joints and drives leave no motion away from it",
+                             name, t));
 }
 
 void RungeKuttaRun::reject(StepOutcome outcome) {
   SimulationStatistics& count = result_.statistics;
   attempt_.reject();
   split_.reset();
+  if (crossings_) crossings_->forget();
   if (!adaptive_) {
     result_.stop(outcome == StepOutcome::unsolved          ? SimulationStatus::not_solved
                  : outcome == StepOutcome::off_constraints ? SimulationStatus::step_too_large
@@ -391,20 +424,18 @@ void RungeKuttaRun::advance() {
                                      : kink                                     ? kink_control_.resume_time()
                                      : crossings_ && crossings_->ends_at_time() ? t1 + kink_control_.past()
                                                                                 : t1;
-  const std::size_t events_before = result_.steps.events.size();
-  std::span<const SwitchEvent> changes;
+  std::vector<SwitchEvent> changes;
   if (crossings_ && t1 < end_) {
-    for (SwitchEvent change : crossings_->advance(step_, next)) {
-      change.step = result_.steps.sizes.size() - 1;
-      result_.steps.events.push_back(change);
-    }
-    changes = std::span(result_.steps.events).subspan(events_before);
+    changes = crossings_->advance(step_, next);
+    for (SwitchEvent& change : changes) change.step = result_.steps.sizes.size() - 1;
+    result_.steps.events.insert(result_.steps.events.end(), changes.begin(), changes.end());
   } else if (switches_ && frozen_) {
     const auto found = std::ranges::equal_range(given_events_, frozen_index_, {}, &SwitchEvent::step);
-    changes = {found.begin(), found.end()};
+    changes.assign(found.begin(), found.end());
   }
   attempt_.advance(next);
   for (const SwitchEvent& change : changes) cross(change, t1, step_.y0, step_.angles0);
+  if (crossings_ && !changes.empty()) cross_driven(t1);
   if (event && adaptive_) {  // the steps before say nothing about those after it
     controller_ = StepController(attempt_.method().error_order, integrator_.options);
     h_ = limited(attempt_.first_size(end_ - step_.t));

@@ -50,6 +50,7 @@ class RungeKuttaRun {
   void follow_given_events();
   bool passes_event();
   void cross(const SwitchEvent& event, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  void cross_driven(double t);
   bool is_better_placed_elsewhere();
   void reject(StepOutcome outcome);
   void note_step();

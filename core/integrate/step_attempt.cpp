@@ -205,6 +205,13 @@ void StepAttempt::advance(double t) {
   first_stage_known_ = false;
 }
 
+std::optional<double> StepAttempt::strike(Switches& switches, std::size_t limit) {
+  Impact impact;
+  if (!set_impact(switches, limit, dynamics_, {step_.t, step_.y0, step_.angles0}, impact)) return std::nullopt;
+  step_.y0 = impact.after;
+  return impact.Ln;
+}
+
 void StepAttempt::restart() {
   first_stage_known_ = false;
   if (!implicit_ || !dynamics_.evaluate(step_.t, step_.y0, step_.angles0, ydot_)) return;

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "core/dynamics/dynamics.hpp"
+#include "core/event/impact.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 #include "core/projection/projection.hpp"
@@ -55,7 +56,9 @@ class StepAttempt {
   double change_by(double at, double beside, double duration);
   void reject();           // the residual of this attempt does not count
   void advance(double t);  // accepts it: the start moves to its end, whose time becomes t
-  void restart();          // accelerations jump at the start, and nothing before it counts
+  // Moves the start from before an impact to after it. Returns the impulse, or nothing if joints leave no motion.
+  std::optional<double> strike(Switches& switches, std::size_t limit);
+  void restart();  // accelerations jump at the start, and nothing before it counts
   bool keeps_sizes() const { return implicit_.has_value(); }  // a new size costs a factor
 
   // Explicit methods through closed loops have responses at the end (Projector::response); others have none.

@@ -8,7 +8,9 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kKink = 1e-9;  // of f and G: at a kink both sides differ by the rounding of the instant
+constexpr double kGrazing = 1e-6;  // of the terms of a switch's rate: the derivative of its instant is the reciprocal
+constexpr double kZero = 1e-8;     // of the terms of a switch, at its own event
+constexpr double kKink = 1e-9;     // of f and G: at a kink both sides differ by the rounding of the instant
 
 }  // namespace
 
@@ -45,7 +47,8 @@ bool Sweep::set_running_gradient(const Step& step, std::size_t objective, int no
   return true;
 }
 
-bool Sweep::set_event(Switches& switches, const SwitchEvent& event, const StatePoint& at, bool back) {
+bool Sweep::set_event(Switches& switches, const SwitchEvent& event, std::size_t first, const StatePoint& at,
+                      bool back) {
   const auto objectives = static_cast<Eigen::Index>(costs_.size());
   const StatePoint here{at.t, at.y, at.angles, motion()};
   event_.jump.setZero(at.y.size());
@@ -53,6 +56,7 @@ bool Sweep::set_event(Switches& switches, const SwitchEvent& event, const StateP
   double size = 0, size_of_costs = 0;
   const auto add_side = [&](int side, double sign) {
     switches.hold(event.of, side);
+    if (motion_) motion_->forget();
     if (!dynamics_.evaluate(at.t, at.y, at.angles, ydot_)) return false;
     event_.jump += sign * ydot_;
     size = std::max(size, ydot_.cwiseAbs().maxCoeff());
@@ -65,19 +69,69 @@ bool Sweep::set_event(Switches& switches, const SwitchEvent& event, const StateP
     return true;
   };
   const bool evaluated = add_side(event.after, -1) && add_side(event.before, 1);
-  if (evaluated) event_.rate = 0;
-  event_.g_y.setZero(at.y.size());
-  event_.g_rho.setZero(g_.rho.size());
-  switches.add_gradient(event.of, here, 1, event_.g_y, event_.g_rho, event_.rate);
-  event_.rate += event_.g_y.dot(ydot_);
+  double of_time = 0;
+  const auto set_gradient = [&](std::size_t of) {
+    event_.g_y.setZero(at.y.size());
+    event_.g_rho.setZero(g_.rho.size());
+    of_time = 0;
+    const double g = switches.add_gradient(of, here, 1, event_.g_y, event_.g_rho, of_time);
+    return std::abs(g) <= kZero * (event_.g_y.cwiseAbs().dot(at.y.cwiseAbs()) + std::abs(of_time * at.t) +
+                                   event_.g_rho.cwiseAbs().dot(mechanism_.rho().cwiseAbs()));
+  };
+  if (!set_gradient(event.of)) set_gradient(first);
   if (!back) switches.hold(event.of, event.after);
-  return evaluated && event.before * event.after != 0 &&
-         (event_.jump.cwiseAbs().maxCoeff() > kKink * size ||
-          (objectives > 0 && event_.jump_of_costs.cwiseAbs().maxCoeff() > kKink * size_of_costs));
+  if (motion_) motion_->forget();
+  const bool jumps = event_.jump.cwiseAbs().maxCoeff() > kKink * size ||
+                     (objectives > 0 && event_.jump_of_costs.cwiseAbs().maxCoeff() > kKink * size_of_costs);
+  return evaluated && event.before * event.after != 0 && jumps && passes(at, ydot_, of_time);
+}
+
+bool Sweep::passes(const StatePoint& at, const Eigen::VectorXd& f_before, double of_time) {
+  event_.rate = event_.g_y.dot(f_before) + of_time;
+  const double size = event_.g_y.cwiseAbs().dot(f_before.cwiseAbs()) + std::abs(of_time);
+  if (std::abs(event_.rate) > kGrazing * size) return true;
+  if (!grazing_) grazing_ = at.t;
+  return false;
+}
+
+bool Sweep::set_strike(Switches& switches, const SwitchEvent& event, const StatePoint& before) {
+  Strike& s = strike_;
+  const StatePoint here{before.t, before.y, before.angles, motion()};
+  if (!dynamics_.evaluate(here.t, here.y, here.angles, ydot_)) return false;
+  s.f_before = ydot_;
+  if (!set_impact(switches, event.of, dynamics_, here, s.impact)) return false;
+  const StatePoint after{here.t, s.impact.after, here.angles, motion()};
+  if (!dynamics_.evaluate(after.t, after.y, after.angles, ydot_)) return false;
+  s.f_after = ydot_;
+  event_.jump_of_costs.setZero(static_cast<Eigen::Index>(costs_.size()));
+  for (std::size_t o = 0; o < costs_.size(); ++o)
+    if (const PointCost* const running = costs_[o].running.get())
+      event_.jump_of_costs(static_cast<Eigen::Index>(o)) = running->value(here) - running->value(after);
+  for (Eigen::VectorXd* x : {&event_.g_y, &s.r_y, &s.c_y}) x->setZero(here.y.size());
+  for (Eigen::VectorXd* x : {&event_.g_rho, &s.r_rho, &s.c_rho}) x->setZero(g_.rho.size());
+  double of_time = 0;
+  switches.add_gradient(event.of, here, 1, event_.g_y, event_.g_rho, of_time);
+  if (!passes(here, s.f_before, of_time)) return false;
+  switches.add_rate_gradient(event.of, here, s.r_y, s.r_rho);
+  Eigen::VectorXd moved = here.y;
+  moved.tail(s.impact.w.size()) = s.impact.w;
+  switches.add_rate_gradient(event.of, {here.t, moved, here.angles}, s.c_y, s.c_rho);
+  s.e = switches.limit(event.of).e;
+  s.slot_e = switches.limit(event.of).slot_e;
+  return true;
+}
+
+bool Sweep::linearise_pushed(Switches& switches, const SwitchEvent& event, const StatePoint& before, double mu) {
+  switches.push(event.of, mu);
+  const bool found = dynamics_.evaluate(before.t, before.y, before.angles, ydot_) &&
+                     dynamics_.linearise(before.t, before.y, before.angles, ydot_.tail(ydot_.size() / 2),
+                                         Eigen::VectorXd(dynamics_.lambda()));
+  return found;
 }
 
 void Sweep::add_to(SimulationStatistics& s) const {
   if (watch_) watch_->add_to(s);
+  if (grazing_) s.grazing = grazing_;
   s.linearised_states += dynamics_.linearised_states() + (implicit_ ? implicit_->places() : 0) +
                          (rosenbrock_ ? rosenbrock_->linearised_states() : 0);
   s.factorisations += dynamics_.factorisations() + projector_->factorisations() +

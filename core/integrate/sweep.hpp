@@ -8,6 +8,7 @@
 
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
+#include "core/event/impact.hpp"
 #include "core/event/switches.hpp"
 #include "core/run/cost.hpp"
 #include "core/run/simulation_result.hpp"
@@ -48,8 +49,24 @@ class Sweep {
     Eigen::VectorXd g_y, g_rho;
     double rate = 0;
   };
-  // Sets event_. Returns whether anything jumps. The switch is held on its side after it, or before it for `back`.
-  bool set_event(Switches& switches, const SwitchEvent& event, const StatePoint& at, bool back);
+  // At an impact, with f-, G- at its state y- and f+, G+ at y+ = y- + w Ln (impact.hpp):
+  //
+  //   E = D + f- dt,  w' = (a(mu)' - a(-mu)')/(2 mu) along E,  r' = r_y E + r_rho,  c' = c_q E + G w' + c_rho
+  //   D+ = E + w'Ln + w Ln' - f+ dt        Ln' = -((1 + e) r' + e'r + c'Ln)/c
+  struct Strike {
+    Impact impact;
+    Eigen::VectorXd f_before, f_after;
+    Eigen::VectorXd r_y, r_rho, c_y, c_rho;  // c_y: in (q, w)
+    double e = 0;
+    int slot_e = -1;
+  };
+  bool set_strike(Switches& switches, const SwitchEvent& event, const StatePoint& before);  // and event_
+  // Returns whether the switch passes zero at all fast, not only touches it; otherwise there is no derivative.
+  bool passes(const StatePoint& at, const Eigen::VectorXd& f_before, double of_time);
+  bool linearise_pushed(Switches& switches, const SwitchEvent& event, const StatePoint& before, double mu);
+  // Sets event_. Returns whether anything jumps. The switch is held on its side after it, or before it for `back`. The
+  // instant is that of the first switch that changes there, if this one is not zero but jumps with it.
+  bool set_event(Switches& switches, const SwitchEvent& event, std::size_t first, const StatePoint& at, bool back);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 
   const Mechanism mechanism_;
@@ -62,11 +79,13 @@ class Sweep {
   Eigen::VectorXd y_;
   CostGradient g_;
   Event event_;
+  Strike strike_;
 
  private:
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   std::optional<QuadratureWatch> watch_;
   Eigen::VectorXd ydot_;
+  std::optional<double> grazing_;  // the first instant of an event without a derivative
 };
 
 }  // namespace mbsopt

@@ -247,8 +247,52 @@ bool TangentSweep::follow(const Step& step, std::span<const SampleEvent> events)
   return true;
 }
 
-void TangentSweep::cross(Switches& switches, const SwitchEvent& event, const StatePoint& at) {
-  if (!set_event(switches, event, at, false)) return;
+void TangentSweep::cross_limit(Switches& switches, const SwitchEvent& event, const StatePoint& at) {
+  if (!set_strike(switches, event, at)) return;
+  const auto& [impact, f_before, f_after, r_y, r_rho, c_y, c_rho, e, slot_e] = strike_;
+  const Eigen::Index n = impact.w.size();
+  LaneRows a = LaneRows::Zero(n, kLanes);
+  const auto add_parameters = [](const Block& b, const Eigen::VectorXd& of_rho, Lanes<1>& lanes) {
+    for (int k = 0; k < kLanes; ++k)
+      if (const int p = b.parameters.parameter[k]; p >= 0) lanes(k) += of_rho(p);
+  };
+  std::vector<Lanes<1>> dt;
+  for (Block& b : blocks_) {
+    Lanes<1>& here = dt.emplace_back(event_.g_y.transpose() * b.y0);
+    add_parameters(b, event_.g_rho, here);
+    here /= -event_.rate;
+    b.y0 += f_before * here;
+    b.Y.setZero();
+  }
+  for (const double sign : {1.0, -1.0}) {
+    const bool linearised = linearise_pushed(switches, event, at, sign * impact.mu);
+    for (Block& b : blocks_) {
+      if (!linearised) break;
+      dynamics_.acceleration_tangent(b.parameters, b.y0, a);
+      b.Y.bottomRows(n) += sign / (2 * impact.mu) * a;
+    }
+    switches.push(event.of, 0);
+  }
+  auto moved = dt.begin();
+  for (Block& b : blocks_) {
+    const auto w = b.Y.bottomRows(n);
+    Lanes<1> dr = r_y.transpose() * b.y0, dc = c_y.head(n).transpose() * b.y0.topRows(n) + c_y.tail(n).transpose() * w;
+    add_parameters(b, r_rho, dr);
+    add_parameters(b, c_rho, dc);
+    Lanes<1> de = Lanes<1>::Zero(), storage;
+    if (const Lanes<1>* const direction = b.parameters.field<1>(slot_e, storage)) de = *direction;
+    const Lanes<1> dL = -((1 + e) * dr + impact.r * de + impact.Ln * dc) / impact.c;
+    b.y0.bottomRows(n) += impact.Ln * w + impact.w * dL;
+    b.y0 -= f_after * *moved;
+    for (int k = 0; k < kLanes; ++k)
+      if (const int p = b.parameters.parameter[k]; p >= 0) psi_rho_.col(p) += (*moved)(k)*event_.jump_of_costs;
+    ++moved;
+  }
+}
+
+void TangentSweep::cross(Switches& switches, const SwitchEvent& event, std::size_t first, const StatePoint& at) {
+  if (switches.is_limit(event.of)) return cross_limit(switches, event, at);
+  if (!set_event(switches, event, first, at, false)) return;
   for (Block& b : blocks_) {
     Lanes<1> dt = event_.g_y.transpose() * b.y0;
     for (int k = 0; k < kLanes; ++k)

@@ -24,7 +24,7 @@ class TangentSweep : public Sweep {
   // Advances over one step. False where a factorisation failed.
   bool follow(const Step& step, std::span<const SampleEvent> events);
   // Moves the directions from before an event to after it (sweep.hpp).
-  void cross(Switches& switches, const SwitchEvent& event, const StatePoint& at);
+  void cross(Switches& switches, const SwitchEvent& event, std::size_t first, const StatePoint& at);
   // Adds the terminal costs; call once, after the last step.
   void finish(const StatePoint& end);
 
@@ -49,6 +49,7 @@ class TangentSweep : public Sweep {
   // to = from + the sum over stages first..last; c: the share of v0, w.c where it is not in `from`.
   static void add_stages(const Block& b, double h, double c, const Weights& w, int first, int last,
                          const LaneRows& from, LaneRows& to);
+  void cross_limit(Switches& switches, const SwitchEvent& event, const StatePoint& at);
   bool follow_explicit(const Step& step, int i);
   bool follow_implicit(const Step& step, const StageGroup& group);
   bool follow_rosenbrock(const Step& step);

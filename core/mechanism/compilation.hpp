@@ -84,6 +84,7 @@ void compile_drives(Compilation& model);
 void compile_forces(Compilation& model);
 void compile_user_forces(Compilation& model, std::vector<std::shared_ptr<const UserForce>> forces);
 void compile_sensors(Compilation& model);
+void compile_limits(Compilation& model);      // after the sensors they are on
 void compile_conditions(Compilation& model);  // after the sensors they are on
 
 }  // namespace mbsopt

@@ -100,6 +100,7 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
   compile_forces(model);
   compile_user_forces(model, std::move(user_forces));
   compile_sensors(model);
+  compile_limits(model);
   compile_conditions(model);
   model.data.equilibrium = scene.equilibrium;
   model.data.assembly_iterations = scene.assembly_iterations;

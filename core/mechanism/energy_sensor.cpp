@@ -68,7 +68,7 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
 }
 
 bool conserves_energy(const MechanismData& d) {
-  return d.applied.empty() && d.user_forces.empty() &&
+  return d.applied.empty() && d.user_forces.empty() && d.limits.empty() &&
          d.forces->all_of([](const auto& f) { return f.conserves_energy(); }) &&
          std::all_of(d.laws.begin(), d.laws.end(), [](auto& l) { return !l.law.programs; });
 }

@@ -59,6 +59,16 @@ struct KinkedSignal {  // a derivative jumps at its samples, later by the delay
   int order = 0;  // of that derivative: 0 of hold, 1 of linear, 3 of spline, less of their derivatives
 };
 
+// One bound of a limit: the gap s - lower or upper - s of a sensor s never is negative.
+struct LimitData {
+  std::string name;
+  Program gap;       // inputs: all parameters, t, all sensors
+  int sign = 1;      // of s in the gap
+  ForcePlace force;  // a constant force along the gradient of s, which is 0 but for impulses
+  double e = 0;      // restitution
+  int slot_e = -1;
+};
+
 struct UserForceData {
   std::shared_ptr<const BoundForce> force;
   std::vector<int> bodies;  // 1-based
@@ -105,6 +115,7 @@ struct MechanismData {
   std::shared_ptr<Forces> forces;  // copies share them
   std::vector<AppliedForce> applied;
   std::vector<UserForceData> user_forces;
+  std::vector<LimitData> limits;
   std::vector<SensorPtr> sensors;
   std::vector<std::string> sensor_names;
   std::vector<ConditionData> conditions;

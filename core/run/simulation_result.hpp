@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -13,10 +14,17 @@
 
 namespace mbsopt {
 
-// A switch that passes from one side to another where a step ends (core/event/switches.hpp).
+// A switch that passes from one side to another where a step ends (core/event/switches.hpp). That of a limit stays on
+// its side: an impact.
 struct SwitchEvent {
   std::size_t step = 0, of = 0;  // the indices of the step and of the switch
   int before = 0, after = 0;     // its sides
+};
+
+// An impact at a limit.
+struct ImpactEvent {
+  std::string name;              // of the limit
+  double time = 0, impulse = 0;  // [s], [N s] or [N m s]
 };
 
 // Accepted steps: times.size() == sizes.size(); step i goes from times[i] by sizes[i].
@@ -74,7 +82,9 @@ struct SimulationStatistics {
   // factor_blocks counts the blocks of the explicit equations' factor (6 x 6, or 3 x 3 in the plane), diagonal ones
   // included. `linearised_states` counts the states at which derivatives of these equations were evaluated.
   long factor_blocks = 0, linearised_states = 0;
-  long kinks = 0;  // at which steps ended: laws and costs passed from one branch to another
+  std::vector<ImpactEvent> impacts;
+  std::optional<double> grazing;  // the instant of an event without a derivative [s]; in runs with derivatives
+  long kinks = 0;                 // at which steps ended: laws and costs passed from one branch to another
   double wall_seconds = 0;
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
   double relative_position_violation = 0;                         // the same, lengths in units of the mechanism's

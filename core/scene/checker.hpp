@@ -117,6 +117,7 @@ void check_meaning(Checker& checker, const Drive& drive);
 void check_meaning(Checker& checker, const Force& force);
 void check_meaning(Checker& checker, const Sensor& sensor);
 void check_meaning(Checker& checker, const Condition& condition);
+void check_meaning(Checker& checker, const Limit& limit);
 void check_meaning(Checker& checker, const IntegratorOptions& options);
 void check_meaning(Checker& checker, const IntegratorSettings& settings);
 void check_meaning(Checker& checker, const SimulationSettings& settings);

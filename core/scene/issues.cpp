@@ -442,6 +442,22 @@ void check_meaning(Checker& checker, const Sensor& sensor) {
                    sensor.force, type_of(*force));
 }
 
+void check_meaning(Checker& checker, const Limit& limit) {
+  if (!limit.lower && !limit.upper) checker.refuse("", "has neither \"lower\" nor \"upper\"; at least one is needed");
+  const std::optional<double> e = checker.facts().value(limit.restitution);
+  if (e && !(*e >= 0 && *e <= 1)) checker.refuse("restitution", "is {}, it must be from 0 to 1", *e);
+  const Sensor* const sensor = checker.facts().sensor(limit.sensor);
+  if (!sensor) return;
+  if (!can_limit(*sensor))
+    return checker.refuse(
+        "sensor",
+        "sensor '{}' is of {}; a limit needs a position (x, y or z, in global axes and not relative), "
+        "a displacement, a distance or an angle",
+        sensor->name, sensor->quantity);
+  for (const auto& [key, bound] : {std::pair{"lower", &limit.lower}, {"upper", &limit.upper}})
+    if (*bound) checker.number(key, **bound, {"", Need::optional, dimension_of_quantity(*sensor)});
+}
+
 void check_meaning(Checker& checker, const Condition& condition) {
   if (!condition.value && !condition.rate)
     checker.refuse("", "has neither \"value\" nor \"rate\"; at least one is needed");

@@ -260,6 +260,13 @@ struct Sensor {
   OrientationField axes;           // of imu: of its axes in those of the body
 };
 
+// A bound that a sensor of positions never passes: bodies strike it and rebound, by Newton's law of restitution.
+struct Limit {
+  std::string name, sensor;
+  std::optional<Field> lower = {}, upper = {};
+  Field restitution;  // e: the rate after the impact is -e times that before
+};
+
 struct Condition {
   std::string sensor;
   std::optional<Field> value = {}, rate = {};
@@ -288,6 +295,7 @@ struct Scene {
   int assembly_iterations = 400;      // initial.iterations: of positions, and of velocities, at most
   bool equilibrium = false;           // initial.equilibrium: start at rest from the static equilibrium near the guess
   std::vector<Sensor> sensors;
+  std::vector<Limit> limits;
   SimulationSettings simulation;
 };
 

@@ -228,6 +228,12 @@ Reads reads_of_quantity(const Sensor& sensor) {
   return is_imu_rate(sensor) ? Reads::velocities : row->reads;
 }
 
+bool can_limit(const Sensor& sensor) {
+  const bool is_place =
+      sensor.quantity == "position" && sensor.component != "norm" && !sensor.relative_to && !sensor.in_body_frame;
+  return is_place || has_word("displacement distance angle body_angle relative_angle", sensor.quantity);
+}
+
 bool is_identifier(std::string_view text) {
   const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
   const auto digit = [](char c) { return c >= '0' && c <= '9'; };

@@ -72,6 +72,8 @@ bool is_sliding(std::string_view motion, std::string_view joint_type);
 // not known here.
 std::optional<Dimension> dimension_of_quantity(const Sensor& sensor);
 Reads reads_of_quantity(const Sensor& sensor);
+// Returns whether a limit may be on the sensor: a force along its gradient is known.
+bool can_limit(const Sensor& sensor);
 
 std::string_view type_of(const Force& force);
 void set_type(Joint& joint, std::string_view type);

@@ -413,6 +413,14 @@ void describe(auto& v, Like<Sensor> auto& s) {
                 {"orientation of the sensor's axes in the body's axes, written like that of a body", row["axes"]});
 }
 
+void describe(auto& v, Like<Limit> auto& l) {
+  v.name("name", l.name, {"name of the limit", Need::required});
+  v.reference("sensor", l.sensor, ElementKind::sensor, {"a position, displacement, distance or angle", Need::required});
+  v.number("lower", l.lower, {"value below which the sensor never is"});
+  v.number("upper", l.upper, {"value above which the sensor never is"});
+  v.number("restitution", l.restitution, {"part of the rate after an impact, 0 to 1", Need::optional, Dimension{}});
+}
+
 void describe(auto& v, Like<Condition> auto& c) {
   v.reference("sensor", c.sensor, ElementKind::sensor, {"a sensor", Need::required});
   v.number("value", c.value, {"its value at the start"});
@@ -522,6 +530,7 @@ void describe(auto& v, Like<Scene> auto& s) {
                  {"true: start at rest from the static equilibrium near the guess"});
   });
   v.named("sensors", s.sensors, {"what can be measured on a state"});
+  v.list("limits", s.limits, {"bounds that sensors never pass: bodies strike them and rebound"});
   v.object("simulation", s.simulation, {"how the mechanism is simulated"});
 }
 

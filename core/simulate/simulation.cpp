@@ -16,6 +16,7 @@
 #include "core/integrate/forward_run.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
 #include "core/integrate/tangent_sweep.hpp"
+#include "core/mechanism/mechanism_data.hpp"
 #include "core/run/run_arguments.hpp"
 #include "core/run/run_ends.hpp"
 #include "core/start/assembly.hpp"
@@ -30,6 +31,11 @@ namespace {
 void note_magnification(double A, double B, const SimulationSettings& settings, SimulationStatistics& statistics) {
   const double error = std::max(A * A * settings.integrator.rtol, B * B * std::numeric_limits<double>::epsilon());
   if (error > statistics.gradient_quadrature.error) statistics.gradient_quadrature = {error, "", settings.end_time};
+}
+
+// The first switch that changes where the step of an event ends.
+std::size_t first_of(const std::vector<SwitchEvent>& events, const SwitchEvent& event) {
+  return std::ranges::lower_bound(events, event.step, {}, &SwitchEvent::step)->of;
 }
 
 RunOptions with_exact_stages(RunOptions options) {
@@ -57,7 +63,9 @@ SimulationResult integrate_tlm(const Mechanism& mechanism, const SimulationSetti
   run.go(
       {sampling.times, {}}, with_exact_stages(options),
       [&](const Step& step, std::span<const SampleEvent> events) { return sweep.follow(step, events); },
-      [&](const SwitchEvent& event, const StatePoint& at) { sweep.cross(switches, event, at); });
+      [&](const SwitchEvent& event, const StatePoint& at) {
+        sweep.cross(switches, event, first_of(result.steps.events, event), at);
+      });
   if (result.ok()) sweep.finish(run.end());
   sweep.add_to(result.statistics);
   note_magnification(sweep.magnification(), run.shift_in_time(), settings, result.statistics);
@@ -90,6 +98,7 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
     StepObserver* const observer = &sink;
     RungeKuttaRun(*attempt, {}, given, again, &switches)
         .go(from.y0, from.angles, {&observer, 1}, static_cast<std::size_t>(from.step), static_cast<std::size_t>(last));
+    checkpoints.set_end(attempt->step().y0, attempt->step().angles0);
     return again.ok();
   };
   std::vector<int> sides = switches.sides();
@@ -100,7 +109,7 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
     switches.hold_all(sides);  // a replay has its own
     for (--index; event != result.steps.events.rend() && event->step == index; ++event) {
       const Eigen::VectorXd y = step.y1(), angles = step.angles0();
-      sweep.cross_back(switches, *event, {step.t1, y, angles});
+      sweep.cross_back(switches, *event, first_of(result.steps.events, *event), {step.t1, y, angles});
       sides[event->of] = event->before;
     }
     return go_on(t_back) && sweep.step_back(step);
@@ -135,10 +144,22 @@ SimulationResult run_by(const Mechanism& mechanism, const SimulationSettings& se
   if (!sampling.times.empty() && !sampling.observe)
     throw std::invalid_argument("sampling: times without anything that observes (observe is empty)");
   const auto begin = std::chrono::steady_clock::now();
+  const bool has_limits = !mechanism.data().limits.empty();
+  const auto refused = [&](const char* why) {
+    SimulationResult result;
+    result.psi.setZero(static_cast<Eigen::Index>(costs.size()));
+    result.stop(SimulationStatus::not_credible,
+                "limit '" + mechanism.data().limits.front().name + "' has no effect: " + why);
+    return result;
+  };
   const auto run = [&] {
+    if (is_cvodes(settings.integrator.type) && has_limits)
+      return refused("CVODES does not follow impacts; take a Runge-Kutta method");
     if (is_cvodes(settings.integrator.type)) return by_cvodes(mechanism, settings, costs, sampling, options);
     Assembly start(mechanism, settings.start_time);
-    if (is_solved(mechanism, settings, start)) return driven(mechanism, settings, costs, sampling, options, start);
+    const bool solved = is_solved(mechanism, settings, start);
+    if (solved && has_limits) return refused("drives leave nothing free that could rebound from it");
+    if (solved) return driven(mechanism, settings, costs, sampling, options, start);
     return integrated(mechanism, settings, costs, sampling, options, std::move(start));
   };
   SimulationResult result = run();

@@ -196,6 +196,12 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   for (const Parameter& p : scene.parameters) parameters.push_back(p.name);
   if (std::string words = in_words(statistics.singular, parameters); !words.empty()) warnings.push_back(words);
   add(missed_pulse(scene, statistics));
+  if (statistics.grazing)
+    warnings.push_back(
+        fmt::format("at t = {:.6g} s a contact or a switch of a law only touches its limit (grazing): the gradients "
+                    "leave it out, and "
+                    "there may be none. Change the parameters, or the end of the run",
+                    *statistics.grazing));
   for (const Jump& jump : statistics.jumps)
     if (jump.size != 0) warnings.push_back(in_words(scene, jump));  // kinks: gradient_doubts.hpp
   return warnings;

@@ -127,7 +127,7 @@ class MentionSearch {
 
 // The lists of what acts on bodies.
 void for_acting(auto& scene, const auto& f) {
-  f(scene.bodies), f(scene.joints), f(scene.drives), f(scene.forces), f(scene.conditions);
+  f(scene.bodies), f(scene.joints), f(scene.drives), f(scene.forces), f(scene.limits), f(scene.conditions);
 }
 
 // Collects what the objectives and measurements of a problem depend on. Without any, a sensor of everything replaces

@@ -149,6 +149,64 @@ TEST_CASE("a force that begins at a place has exact gradients in this place", "[
   check_closed_form(s, slowed_down);
 }
 
+namespace {
+
+// rho = (F, vi, ts): x'' = F (x + 1) from ts on, until 0.5 s.
+VectorXd let_go(const VectorXd& rho) {
+  const double w = std::sqrt(rho(0)), s = 0.5 - rho(2), C = std::cosh(w * s), S = std::sinh(w * s);
+  const double z = rho(1) * rho(2) + 1;
+  return Eigen::Vector2d(z * C + rho(1) / w * S - 1, z * w * S + rho(1) * C);
+}
+
+}  // namespace
+
+TEST_CASE("a decision that jumps with another one follows the instant of that", "[events]") {
+  Scene s = block({{"F", 2}, {"vi", 0.3}, {"ts", 0.2}}, "F*max(0, x + abs(t - ts)/(t - ts))");
+  s.simulation.end_time = 0.5;
+  check_closed_form(s, let_go);
+}
+
+TEST_CASE("a running cost of an acceleration that jumps has exact gradients", "[events]") {
+  Scene s = block({{"F", 3}, {"vi", 0.4}, {"ts", 0.2}}, "F*(1 + abs(t - ts)/(t - ts))/2");
+  s.sensors.push_back(quantity("a", "acceleration", "x"));
+  s.simulation.end_time = 0.5;
+  const Mechanism mechanism(s, nominal(s));
+  struct AccelerationTimesTime final : PointCost {
+    const Mechanism mechanism;
+    explicit AccelerationTimesTime(const Mechanism& m) : mechanism(m) {}
+    double value(const StatePoint& at) const override { return at.t * mechanism.sensor_value(2, at); }
+    double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+      return at.t * mechanism.add_sensor_gradient(2, at, at.t * scale, y_bar, rho_bar);
+    }
+    std::shared_ptr<const PointCost> bound_to(const Mechanism& m, const Program*) const override {
+      return std::make_shared<AccelerationTimesTime>(m);
+    }
+  };
+  Cost cost;
+  cost.running = std::make_shared<AccelerationTimesTime>(mechanism);
+  const std::vector<Cost> costs{cost};
+  for (const SimulationResult& run :
+       {simulate_tlm(mechanism, s.simulation, costs), simulate_adjoint(mechanism, s.simulation, costs)}) {
+    REQUIRE(run.ok());
+    CHECK(run.psi(0) == Approx(3 * (0.25 - 0.04) / 2).epsilon(1e-9));
+    CHECK(run.psi_rho(0, 0) == Approx((0.25 - 0.04) / 2).epsilon(1e-9));
+    CHECK(run.psi_rho(0, 2) == Approx(-3 * 0.2).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("an event on the grid of fixed steps is one event", "[events]") {
+  Scene s = block({{"F", 5}, {"vi", -3}}, "F");
+  s.simulation.end_time = 0.9;
+  s.simulation.integrator.type = "rk4", s.simulation.integrator.step = 1e-3;
+  std::get<PointForce>(s.forces[0].kind).components[0] = f("F - 5*max(v, 0)");
+  const Mechanism braked(s, nominal(s));
+  const SimulationResult run = simulate_tlm(braked, s.simulation, costs_of(braked));
+  REQUIRE(run.ok());
+  CHECK(run.steps.events.size() == 1);
+  CHECK(run.steps.events[0].after != 0);
+  CHECK(run.steps.sizes.size() <= 901);
+}
+
 TEST_CASE("the sides, the events and the grid of fixed steps", "[events]") {
   Scene s = block({{"vi", 0.9}}, "-2000*max(0, x - 0.151)");
   s.simulation.end_time = 0.5;
@@ -261,5 +319,104 @@ TEST_CASE("gradients through many events are those of free runs, by both sweeps 
     const double difference = (8 * (psi(1) - psi(-1)) - (psi(2) - psi(-2))) / (12 * h);
     INFO(s.parameters[static_cast<std::size_t>(k)].name);
     CHECK(tlm.psi_rho(0, k) == Approx(difference).epsilon(2e-6).margin(2e-6 * size));
+  }
+}
+
+namespace {
+
+// A ball of 1 kg above a floor at 0.
+Scene ball_above_floor() {
+  Scene s = block({{"h", 1}, {"e", 0.8}, {"g", 9.81}, {"vi", 0}}, "-g");
+  s.conditions = {value_of("x", "h"), rate_of("x", "vi")};
+  Limit floor;
+  floor.name = "floor", floor.sensor = "x", floor.lower = f("0"), floor.restitution = f("e");
+  s.limits = {floor};
+  return s;
+}
+
+// rho = (h, e, g, vi), with vi = 0 in the values; (height, speed) after two impacts at 1.7 s.
+VectorXd bounced_twice(const VectorXd& rho) {
+  const double h = rho(0), e = rho(1), g = rho(2), vi = rho(3);
+  double v = std::sqrt(vi * vi + 2 * g * h), t = (vi + v) / g;
+  for (int i = 0; i < 1; ++i) t += 2 * e * v / g, v *= e;
+  const double tau = 1.7 - t;
+  return Eigen::Vector2d(e * v * tau - g * tau * tau / 2, e * v - g * tau);
+}
+
+}  // namespace
+
+TEST_CASE("a ball that bounces has exact gradients in height, restitution and gravity", "[events]") {
+  Scene s = ball_above_floor();
+  s.simulation.end_time = 1.7;
+  s.parameters[3].value = 0.1;  // so that its steps of differences are not 0
+  check_closed_form(s, bounced_twice);
+}
+
+TEST_CASE("impacts lose the energy of their restitution, and a ball at rest ends the run in words", "[events]") {
+  Scene s = ball_above_floor();
+  s.simulation.end_time = 4;
+  const Mechanism mechanism(s, nominal(s));
+  const SimulationResult run = simulate(mechanism, s.simulation);
+  REQUIRE(run.ok());
+  REQUIRE(run.statistics.impacts.size() > 10);
+  double v = std::sqrt(2 * 9.81), t = v / 9.81;
+  for (std::size_t i = 0; i < 10; ++i) {
+    CHECK(run.statistics.impacts[i].time == Approx(t).epsilon(1e-10));
+    CHECK(run.statistics.impacts[i].impulse == Approx(1.8 * v).epsilon(1e-9));
+    t += 2 * 0.8 * v / 9.81, v *= 0.8;
+  }
+  s.simulation.end_time = 5;
+  const SimulationResult rests = simulate(Mechanism(s, nominal(s)), s.simulation);
+  CHECK_FALSE(rests.ok());
+  CHECK(rests.message.find("limit 'floor' comes to rest at t = 4.06") != std::string::npos);
+  s.conditions = {value_of("x", "-0.1"), rate_of("x", "1")};
+  CHECK(simulate(Mechanism(s, nominal(s)), s.simulation).message.find("passed at the start") != std::string::npos);
+}
+
+// The gap is that of a point whose place, and so the impulse, depends on parameters and the motion of two bodies.
+TEST_CASE("impacts of a chain have the gradients of free runs", "[events]") {
+  Scene s = double_pendulum();
+  add_parameters(s, {{"e", 0.7}, {"floor", -1.3}, {"tip", 0.7}, {"wall", -0.9}});
+  s.gravity = {0.0, -9.81, 0.0};
+  s.sensors.push_back(point_sensor("height", "position", "lower", vec("tip", "0", "0"), "y"));
+  Limit floor, wall;
+  floor.name = "floor", floor.sensor = "height", floor.lower = f("floor"), floor.restitution = f("e");
+  wall.name = "wall", wall.sensor = "theta2", wall.lower = f("wall"), wall.upper = f("0.6"),
+  wall.restitution = f("0.5");
+  s.limits = {floor, wall};
+  s.simulation.end_time = 1.1;
+  s.simulation.integrator.rtol = 1e-11, s.simulation.integrator.atol = 1e-12;
+  const auto [type, model] =
+      GENERATE(std::pair("dopri853", ModelChoice::planar), std::pair("dopri853", ModelChoice::spatial),
+               std::pair("radau5", ModelChoice::spatial));
+  s.simulation.integrator.type = type, s.simulation.model = model;
+  if (s.simulation.integrator.type == "radau5") s.simulation.integrator.rtol = 1e-9;
+  const VectorXd rho = nominal(s);
+  const Mechanism mechanism(s, rho);
+  Cost cost;
+  cost.terminal = cost.running = std::make_shared<StateNorm>();
+  const std::vector<Cost> costs{cost};
+  const SimulationResult tlm = simulate_tlm(mechanism, s.simulation, costs);
+  INFO(tlm.message);
+  REQUIRE(tlm.ok());
+  CHECK(tlm.statistics.impacts.size() >= 3);
+  SimulationSettings small = s.simulation;
+  small.adjoint_memory_mib = 1e-3;
+  const double size = tlm.psi_rho.cwiseAbs().maxCoeff();
+  for (const SimulationSettings& settings : {s.simulation, small}) {
+    const SimulationResult adjoint = simulate_adjoint(mechanism, settings, costs);
+    REQUIRE(adjoint.ok());
+    CHECK((adjoint.psi_rho - tlm.psi_rho).cwiseAbs().maxCoeff() < 1e-10 * size);
+  }
+  for (Eigen::Index k = 0; k < rho.size(); ++k) {
+    const double h = 1e-5 * std::max(std::abs(rho(k)), 0.1);
+    const auto psi = [&](double steps) {
+      VectorXd there = rho;
+      there(k) += steps * h;
+      return simulate(Mechanism(s, there), s.simulation, costs).psi(0);
+    };
+    const double difference = (8 * (psi(1) - psi(-1)) - (psi(2) - psi(-2))) / (12 * h);
+    INFO(s.parameters[static_cast<std::size_t>(k)].name);
+    CHECK(tlm.psi_rho(0, k) == Approx(difference).epsilon(5e-6).margin(5e-6 * size));
   }
 }
