@@ -19,7 +19,10 @@ class MotionSolver final : public MotionSource {
 
   ~MotionSolver() override;
 
-  void forget() { solved_.reset(), linearised_ = false; }  // the forces changed
+  void forget() {  // the forces changed
+    solved_.reset();
+    linearised_ = false;
+  }
   const Motion& motion(const StatePoint& at, MotionPart part) override;
   Motion& bar(MotionPart part) override;
   void fold_bar(const StatePoint& at, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) override;

@@ -34,7 +34,23 @@ bool is_root_of_square(const Program& program, const Program::Instruction& in) {
   return square.operation == Operation::multiply && square.a == square.b;
 }
 
+// x of abs(x) and sqrt(x^2), else the instruction itself.
+int base_of(const Program& program, int k) {
+  const Program::Instruction& in = program.code()[static_cast<std::size_t>(k)];
+  if (in.operation == Operation::abs) return in.a;
+  return is_root_of_square(program, in) ? program.code()[static_cast<std::size_t>(in.a)].a : k;
+}
+
+// Returns whether x is a factor of an instruction, or abs(x) is.
+bool has_factor(const Program& program, int k, int x) {
+  const Program::Instruction& in = program.code()[static_cast<std::size_t>(k)];
+  if (base_of(program, k) == x) return true;
+  if (in.operation == Operation::negate) return has_factor(program, in.a, x);
+  return in.operation == Operation::multiply && (has_factor(program, in.a, x) || has_factor(program, in.b, x));
+}
+
 // Per instruction, the least exponent of powers and roots that have no value where it is negative; infinite: none has.
+// A denominator counts as the exponent -1, unless it cancels.
 std::vector<double> roots_of(const Program& program) {
   const std::vector<Program::Instruction>& code = program.code();
   std::vector<double> roots(code.size(), INFINITY);
@@ -48,10 +64,14 @@ std::vector<double> roots_of(const Program& program) {
       constexpr double kHertz = 1.5;  // where it is not known
       const Program::Instruction& n = code[static_cast<std::size_t>(b)];
       if (n.operation != Operation::number) lower(a, kHertz);
-      if (n.operation == Operation::number && std::floor(n.constant) != n.constant) lower(a, n.constant);
+      if (n.operation == Operation::number && (n.constant < 0 || std::floor(n.constant) != n.constant))
+        lower(a, n.constant);
+    } else if (f == Operation::divide) {
+      lower(a, roots[i]);
+      if (!has_factor(program, a, base_of(program, b))) lower(b, -1);
     } else if ((f == Operation::sqrt || f == Operation::log) && !is_root_of_square(program, code[i])) {
       lower(a, 0.5);
-    } else if (f == Operation::negate || f == Operation::multiply || f == Operation::divide) {
+    } else if (f == Operation::negate || f == Operation::multiply) {
       lower(a, roots[i]);
       if (f == Operation::multiply) lower(b, roots[i]);
     }
@@ -69,6 +89,7 @@ std::vector<Branching> branchings_of(const Program& program, int parameters, int
     return program.code()[static_cast<std::size_t>(k)].operation == Operation::number;
   };
   const auto add = [&](std::size_t i, int a, bool of_motion, Operation how, int b, double sample) {
+    if (roots[i] < 1) return;  // its slope is infinite, or it has a pole: steps that end there would hide that
     const Program::Instruction& in = program.code()[i];
     Branching branching{i, sample, {}, 1, roots[i], 0};
     if (in.operation == Operation::max || in.operation == Operation::min)

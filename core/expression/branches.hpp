@@ -13,7 +13,7 @@
 namespace mbsopt {
 
 // The branchings whose decision depends on an input from `parameters` on. Tables of time alone are left out
-// (kink_times.hpp), and so are those with many samples, which follow smooth functions.
+// (kink_times.hpp), and so are those with many samples, which follow smooth functions, and poles and roots at the kink.
 std::vector<Branching> branchings_of(const Program& program, int parameters, int time);
 
 // The same program with a side, 1 or -1, of each branching's decision; with side 0 it stays as written. It has at most

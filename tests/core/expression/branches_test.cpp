@@ -74,8 +74,8 @@ TEST_CASE("a held quotient of a number by itself has a value at zero", "[branche
 
 TEST_CASE("branches of parameters alone, of smooth functions and of dense tables are left as they are", "[branches]") {
   const Symbols symbols = names();
-  for (const char* text :
-       {"max(p, 2)*x", "tanh(x)", "spline(x, [0, 1, 2, 3], [0, 1, 0, 1])", "table(t, [0, 1, 2], [0, 1, 0])"})
+  for (const char* text : {"1/abs(x)", "sqrt(abs(x))", "max(p, 2)*x", "tanh(x)",
+                           "spline(x, [0, 1, 2, 3], [0, 1, 0, 1])", "table(t, [0, 1, 2], [0, 1, 0])"})
     CHECK(branchings_of(Program(Expression::parse(text), symbols), 1, 2).empty());
 }
 
@@ -89,5 +89,4 @@ TEST_CASE("powers and roots tell at which side their base begins", "[branches]")
   CHECK(first("(-2*min(x, 0))^1.2").root == 1.2);
   CHECK(first("(-2*min(x, 0))^1.2").rises == -1);
   CHECK(std::isinf(first("max(x, 0)^2").root));
-  CHECK(first("sqrt(max(0, x))").root == 0.5);
 }

@@ -139,6 +139,9 @@ TEST_CASE("an objective in C++ without any cost is refused", "[objective]") {
 TEST_CASE("an evaluation warns of a running cost that jumps with the motion, by the objective's name", "[gradient]") {
   Problem problem = five_bar::problem(1e-6);
   problem.objectives[0].running = Expression::parse("abs(r2_y + 2.05)/(r2_y + 2.05)");  // the point falls from -2
+  Evaluator follows(problem.scene, objectives_of(problem));
+  CHECK(follows.gradients(follows.start()).warnings.empty());
+  problem.scene.simulation.follows_kinks = false;
   Evaluator evaluator(problem.scene, objectives_of(problem));
   const Evaluation e = evaluator.gradients(evaluator.start());
   REQUIRE(e.ok);
