@@ -104,8 +104,9 @@ class Evaluator {
   // Other objectives have none. None has one if the run fails.
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
 
-  // Evaluates on given steps, unless they end at events, which move, and leaves the stored point unchanged: values, and discrete gradients by tlm or adjoint.
-  // CVODES cannot take given steps and throws std::invalid_argument. Not in load cases.
+  // Evaluates on given steps, unless they end at events, which move, and leaves the stored point unchanged: values, and
+  // discrete gradients by tlm or adjoint. CVODES cannot take given steps and throws std::invalid_argument. Not in load
+  // cases.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
   Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
 

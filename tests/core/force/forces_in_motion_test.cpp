@@ -264,7 +264,8 @@ TEST_CASE("a force on the ground, or with a name that nobody knows, is refused w
   torque.components[2] = f("theta");
   s.forces[0].kind = torque;
   s.sensors.push_back(tension);
-  CHECK(message(s).find("sensors[2].force: 'torque' is a torque; only a tsda, rsda, torsion_bar, stop or contact") == 0);
+  CHECK(message(s).find("sensors[2].force: 'torque' is a torque; only a tsda, rsda, torsion_bar, stop or contact") ==
+        0);
   s.sensors.back().force = "nothing";
   CHECK(message(s).find("sensors[2].force: there is no force 'nothing'") == 0);
   s.sensors.pop_back();
