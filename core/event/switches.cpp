@@ -179,11 +179,11 @@ std::vector<double> Switches::zeros(std::size_t k, double start, double end) con
   };
   std::vector<double> found;
   const std::vector<double> pieces = pieces_of(s.function, static_cast<int>(time), x, start, end);
-  constexpr int kParts = 4;  // a cubic between two pieces turns twice
+  constexpr int kLooks = 4;  // a cubic between two pieces turns twice
   double from = start;
   for (std::size_t i = 1; i < pieces.size(); ++i) {
-    for (int part = 1; part <= kParts; ++part) {
-      const double to = pieces[i - 1] + (pieces[i] - pieces[i - 1]) * part / kParts;
+    for (int part = 1; part <= kLooks; ++part) {
+      const double to = pieces[i - 1] + (pieces[i] - pieces[i - 1]) * part / kLooks;
       double low = from, high = to;
       const bool rises = value(high) > 0;
       from = to;

@@ -430,8 +430,8 @@ void RungeKuttaRun::advance() {
     for (SwitchEvent& change : changes) change.step = result_.steps.sizes.size() - 1;
     result_.steps.events.insert(result_.steps.events.end(), changes.begin(), changes.end());
   } else if (switches_ && frozen_) {
-    const auto found = std::ranges::equal_range(given_events_, frozen_index_, {}, &SwitchEvent::step);
-    changes.assign(found.begin(), found.end());
+    auto found = std::ranges::lower_bound(given_events_, frozen_index_, {}, &SwitchEvent::step);
+    for (; found != given_events_.end() && found->step == frozen_index_; ++found) changes.push_back(*found);
   }
   attempt_.advance(next);
   for (const SwitchEvent& change : changes) cross(change, t1, step_.y0, step_.angles0);
