@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kGrazing = 1e-6;  // of the terms of a switch's rate: the derivative of its instant is the reciprocal
 constexpr double kZero = 1e-8;     // of the terms of a switch, at its own event
-constexpr double kKink = 1e-9;     // of f and G: at a kink both sides differ by the rounding of the instant
+constexpr double kKink = 1e-9;     // of f and G: more is no rounding, so that a grazing event has no derivative
 
 }  // namespace
 
@@ -53,7 +53,8 @@ bool Sweep::set_event(Switches& switches, const SwitchEvent& event, std::size_t 
   const StatePoint here{at.t, at.y, at.angles, motion()};
   event_.jump.setZero(at.y.size());
   event_.jump_of_costs.setZero(objectives);
-  double size = 0, size_of_costs = 0;
+  double size = 0;
+  Eigen::VectorXd size_of_costs = Eigen::VectorXd::Zero(objectives);
   const auto add_side = [&](int side, double sign) {
     switches.hold(event.of, side);
     if (motion_) motion_->forget();
@@ -64,7 +65,7 @@ bool Sweep::set_event(Switches& switches, const SwitchEvent& event, std::size_t 
       const PointCost* const running = costs_[static_cast<std::size_t>(o)].running.get();
       const double G = running ? running->value(here) : 0;
       event_.jump_of_costs(o) += sign * G;
-      size_of_costs = std::max(size_of_costs, std::abs(G));
+      size_of_costs(o) = std::max(size_of_costs(o), std::abs(G));
     }
     return true;
   };
@@ -82,15 +83,15 @@ bool Sweep::set_event(Switches& switches, const SwitchEvent& event, std::size_t 
   if (!back) switches.hold(event.of, event.after);
   if (motion_) motion_->forget();
   const bool jumps = event_.jump.cwiseAbs().maxCoeff() > kKink * size ||
-                     (objectives > 0 && event_.jump_of_costs.cwiseAbs().maxCoeff() > kKink * size_of_costs);
-  return evaluated && event.before * event.after != 0 && jumps && passes(at, ydot_, of_time);
+                     (event_.jump_of_costs.cwiseAbs().array() > kKink * size_of_costs.array()).any();
+  return evaluated && event.before * event.after != 0 && passes(at, ydot_, of_time, jumps);
 }
 
-bool Sweep::passes(const StatePoint& at, const Eigen::VectorXd& f_before, double of_time) {
+bool Sweep::passes(const StatePoint& at, const Eigen::VectorXd& f_before, double of_time, bool jumps) {
   event_.rate = event_.g_y.dot(f_before) + of_time;
   const double size = event_.g_y.cwiseAbs().dot(f_before.cwiseAbs()) + std::abs(of_time);
   if (std::abs(event_.rate) > kGrazing * size) return true;
-  if (!grazing_) grazing_ = at.t;
+  if (jumps && !grazing_) grazing_ = at.t;
   return false;
 }
 
@@ -111,7 +112,7 @@ bool Sweep::set_strike(Switches& switches, const SwitchEvent& event, const State
   for (Eigen::VectorXd* x : {&event_.g_rho, &s.r_rho, &s.c_rho}) x->setZero(g_.rho.size());
   double of_time = 0;
   switches.add_gradient(event.of, here, 1, event_.g_y, event_.g_rho, of_time);
-  if (!passes(here, s.f_before, of_time)) return false;
+  if (!passes(here, s.f_before, of_time, true)) return false;
   switches.add_rate_gradient(event.of, here, s.r_y, s.r_rho);
   Eigen::VectorXd moved = here.y;
   moved.tail(s.impact.w.size()) = s.impact.w;
@@ -123,10 +124,9 @@ bool Sweep::set_strike(Switches& switches, const SwitchEvent& event, const State
 
 bool Sweep::linearise_pushed(Switches& switches, const SwitchEvent& event, const StatePoint& before, double mu) {
   switches.push(event.of, mu);
-  const bool found = dynamics_.evaluate(before.t, before.y, before.angles, ydot_) &&
-                     dynamics_.linearise(before.t, before.y, before.angles, ydot_.tail(ydot_.size() / 2),
-                                         Eigen::VectorXd(dynamics_.lambda()));
-  return found;
+  return dynamics_.evaluate(before.t, before.y, before.angles, ydot_) &&
+         dynamics_.linearise(before.t, before.y, before.angles, ydot_.tail(ydot_.size() / 2),
+                             Eigen::VectorXd(dynamics_.lambda()));
 }
 
 void Sweep::add_to(SimulationStatistics& s) const {

@@ -61,11 +61,12 @@ class Sweep {
     int slot_e = -1;
   };
   bool set_strike(Switches& switches, const SwitchEvent& event, const StatePoint& before);  // and event_
-  // Returns whether the switch passes zero at all fast, not only touches it; otherwise there is no derivative.
-  bool passes(const StatePoint& at, const Eigen::VectorXd& f_before, double of_time);
+  // Sets the rate. Returns whether the switch passes zero, not only touches it. Otherwise a jump has no derivative.
+  bool passes(const StatePoint& at, const Eigen::VectorXd& f_before, double of_time, bool jumps);
+  // Linearises the accelerations under a force mu along the gap; the force stays.
   bool linearise_pushed(Switches& switches, const SwitchEvent& event, const StatePoint& before, double mu);
-  // Sets event_. Returns whether anything jumps. The switch is held on its side after it, or before it for `back`. The
-  // instant is that of the first switch that changes there, if this one is not zero but jumps with it.
+  // Sets event_. Returns whether its instant has a derivative. The switch is held on its side after it, or before it
+  // for `back`. The instant is that of the first switch that changes there, if this one is not zero but jumps with it.
   bool set_event(Switches& switches, const SwitchEvent& event, std::size_t first, const StatePoint& at, bool back);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 

@@ -149,6 +149,19 @@ TEST_CASE("an evaluation warns of a running cost that jumps with the motion, by 
   CHECK_THAT(e.warnings.back(), Contains("the integrand of objective '" + problem.objectives[0].name + "' jumps by 2"));
 }
 
+TEST_CASE("a jump of a small running cost counts beside a large one", "[gradient]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.objectives[0].running = Expression::parse("1e-6*abs(r2_y + 2.05)/(r2_y + 2.05)");
+  Evaluator alone(problem.scene, objectives_of(problem));
+  const Eigen::VectorXd expected = alone.gradients(alone.start()).psi_rho.row(0);
+  REQUIRE(expected.norm() > 1e-9);
+  problem.objectives.push_back(problem.objectives[0]);
+  problem.objectives[1].name = "large", problem.objectives[1].running = Expression::parse("1e9*(r2_y + 3)");
+  Evaluator both(problem.scene, objectives_of(problem));
+  const Eigen::VectorXd found = both.gradients(both.start()).psi_rho.row(0);
+  CHECK((found - expected).norm() < 1e-6 * expected.norm());
+}
+
 TEST_CASE("the gradient of a maximum is resolved although the motion rests after a short blow", "[gradient]") {
   Scene scene;  // 14 N m for 20 ms turn the wheel at 0.28/J = 0.4 rad/s from 1 s on
   testing::add_parameters(scene, {{"J", 0.7}});
