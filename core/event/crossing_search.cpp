@@ -335,8 +335,11 @@ bool CrossingSearch::ends_at_time() const {
 
 void CrossingSearch::changed(const SwitchEvent& event, double t) {
   const double n = switches_.root(event.of);
+  const bool begins = rtol_ > 0 && std::isfinite(n);
+  if (!begins && event.of != root_.of) return;  // contact goes on
   root_ = {};
-  if (!(rtol_ > 0) || std::isinf(n)) return;
+  root_.of = event.of;
+  if (!begins) return;
   root_.since = t;
   root_.n = n;
 }

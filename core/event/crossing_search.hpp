@@ -36,7 +36,7 @@ class CrossingSearch {
   };
   // The error of a step of size h from t, in tolerances, with that of its derivatives.
   double with_derivatives(double t, double h, double error);
-  // Of a step that the error allows.
+  // Looks at a step that the error allows.
   const Verdict& look_at(const Step& step, double error);
   void forget() { target_ = {}; }  // a step was rejected: its instants are sought anew
   // The step that was looked at last stays, and the next one begins at `next`. Returns the changes between them.
@@ -75,6 +75,7 @@ class CrossingSearch {
   double least_part_;  // of a step, to which an instant is found
   double rtol_;        // 0 with fixed steps
   struct {
+    std::size_t of = 0;                             // the switch
     double since = -INFINITY, n = 1, T = 0;         // the beginning of contact, the root's exponent [s]
     double until = -INFINITY, last = 0, error = 0;  // its end, as found by a step that was too long, and its error
   } root_;

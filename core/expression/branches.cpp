@@ -34,6 +34,11 @@ bool is_root_of_square(const Program& program, const Program::Instruction& in) {
   return square.operation == Operation::multiply && square.a == square.b;
 }
 
+bool may_branch(const Program::Instruction& in) {
+  return takes_difference(in.operation) || in.operation == Operation::abs || in.operation == Operation::sign ||
+         in.operation == Operation::sqrt || in.operation == Operation::curve;
+}
+
 // x of abs(x) and sqrt(x^2), else the instruction itself.
 int base_of(const Program& program, int k) {
   const Program::Instruction& in = program.code()[static_cast<std::size_t>(k)];
@@ -83,6 +88,7 @@ std::vector<double> roots_of(const Program& program) {
 
 std::vector<Branching> branchings_of(const Program& program, int parameters, int time) {
   std::vector<Branching> found;
+  if (std::ranges::none_of(program.code(), may_branch)) return found;
   const Symbols none;
   const std::vector<double> roots = roots_of(program);
   const auto is_number = [&](int k) {

@@ -298,7 +298,7 @@ bool RungeKuttaRun::passes_event() {
   return true;
 }
 
-// What changes with the changes so far, at the end of the last step.
+// Changes what jumps with the changes so far, at the end of the last step.
 void RungeKuttaRun::cross_driven(double t) {
   const StatePoint at{step_.t, step_.y0, step_.angles0};
   while (std::optional<SwitchEvent> event = crossings_->driven(at)) {

@@ -403,7 +403,7 @@ void describe(auto& v, Like<Sensor> auto& s) {
   v.reference("body2", s.body2, ElementKind::body, {"body of the second point", row["body2"]});
   v.point("point1", s.point1, s.body1, {"first point [m]", row["point1"], kLength});
   v.point("point2", s.point2, s.body2, {"second point [m]", row["point2"], kLength});
-  v.reference("force", s.force, ElementKind::force, {"a tsda, rsda or torsion_bar", row["force"]});
+  v.reference("force", s.force, ElementKind::force, {"a tsda, rsda, torsion_bar, stop or contact", row["force"]});
   v.word("kind", s.kind, Words{"force torque"}, {"which reaction", row["kind"]});
   v.reference("drive", s.drive, ElementKind::drive, {"a drive", row["drive"]});
   v.point("axis", s.axis, s.body1.empty() ? "ground" : s.body1, {"direction in the ground, or in body1", row["axis"]});

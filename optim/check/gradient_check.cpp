@@ -114,9 +114,10 @@ class Check {
       moving.insert(kinks.moved_by.begin(), kinks.moved_by.end());
     const std::size_t events = run_.steps.events.size();
     if (events > 0 && result_.discrete)
-      result_.warnings.push_back(fmt::format(
-          "steps end at {} kinks or jumps of laws, which parameters move: compared with differences on free steps only",
-          events));
+      result_.warnings.push_back(
+          fmt::format("steps end at {} events (kinks, jumps, impacts), which parameters move: compared with "
+                      "differences on free steps only",
+                      events));
     Eigen::Array<bool, Eigen::Dynamic, 1> frozen =
         Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(run_.rho.size(), result_.discrete && events == 0);
     if (events > 0) return frozen;

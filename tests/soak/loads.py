@@ -279,13 +279,17 @@ class Loads:
                 "stiffness": [k * rng.uniform(0.5, 2) for _ in range(3)], "damping": [c, c, c],
                 "torsional_stiffness": [kt * rng.uniform(0.5, 2) for _ in range(3)], "torsional_damping": [ct, ct, ct]}
 
+    def movable(self):
+        """A joint with an angle or a displacement, and whether it is an angle."""
+        joints = [j for j in self.m.joints if j.angle is not None or j.displacement is not None]
+        joint = self.rng.choice(joints) if joints else None
+        return joint, joint is not None and joint.angle is not None
+
     def friction(self):
         rng, f = self.rng, self.family
-        joints = [j for j in self.m.joints if j.angle is not None or j.displacement is not None]
-        if not joints:
+        joint, turns = self.movable()
+        if not joint:
             return None
-        joint = rng.choice(joints)
-        turns = joint.angle is not None
         inertia = self.least(joint.bodies, "inertia" if turns else "mass")
         rate = (1 if turns else f.length) / f.time
         friction = {"type": "friction", "joint": joint.name, "motion": "rotation" if turns else "translation",
@@ -305,11 +309,9 @@ class Loads:
     def stop(self):
         """In a joint, which the motion may come to."""
         rng, f = self.rng, self.family
-        joints = [j for j in self.m.joints if j.angle is not None or j.displacement is not None]
-        if not joints:
+        joint, turns = self.movable()
+        if not joint:
             return None
-        joint = rng.choice(joints)
-        turns = joint.angle is not None
         size, start = (1, joint.angle) if turns else (f.length, joint.displacement)
         bounds = {key: start + sign * size * rng.uniform(0, 0.4) for key, sign in (("lower", -1), ("upper", 1))
                   if rng.random() < 0.7}

@@ -258,6 +258,48 @@ TEST_CASE("without a side that leads away from it, a switch is held no more", "[
 
 namespace {
 
+// The gradients of both sweeps, also with little memory, against differences of free runs with steps of `part` of each
+// parameter.
+void check_free_runs(Scene s, const Cost& cost, double part, double allowed) {
+  const auto [type, model] =
+      GENERATE(std::pair("dopri853", ModelChoice::planar), std::pair("dopri853", ModelChoice::spatial),
+               std::pair("radau5", ModelChoice::spatial));
+  s.simulation.integrator.type = type, s.simulation.model = model;
+  s.simulation.integrator.rtol = s.simulation.integrator.type == "radau5" ? 1e-9 : 1e-11;
+  s.simulation.integrator.atol = 1e-12;
+  const VectorXd rho = nominal(s);
+  const Mechanism mechanism(s, rho);
+  const std::vector<Cost> costs{cost};
+  const SimulationResult tlm = simulate_tlm(mechanism, s.simulation, costs);
+  INFO(tlm.message);
+  REQUIRE(tlm.ok());
+  CHECK(tlm.steps.events.size() >= 3);
+  CHECK(tlm.statistics.impacts.empty() == s.limits.empty());
+  SimulationSettings small = s.simulation;
+  small.adjoint_memory_mib = 1e-3;
+  const double size = tlm.psi_rho.cwiseAbs().maxCoeff();
+  for (const SimulationSettings& settings : {s.simulation, small}) {
+    const SimulationResult adjoint = simulate_adjoint(mechanism, settings, costs);
+    REQUIRE(adjoint.ok());
+    CHECK((adjoint.psi_rho - tlm.psi_rho).cwiseAbs().maxCoeff() < 1e-10 * size);
+    if (settings.adjoint_memory_mib < 1) CHECK(adjoint.statistics.recomputed_steps > 0);
+  }
+  for (Eigen::Index k = 0; k < rho.size(); ++k) {
+    const double h = part * std::max(std::abs(rho(k)), 0.1);
+    const auto psi = [&](double steps) {
+      VectorXd there = rho;
+      there(k) += steps * h;
+      const SimulationResult run = simulate(Mechanism(s, there), s.simulation, costs);
+      INFO(run.message);
+      REQUIRE(run.ok());
+      return run.psi(0);
+    };
+    const double difference = (8 * (psi(1) - psi(-1)) - (psi(2) - psi(-2))) / (12 * h);
+    INFO(s.parameters[static_cast<std::size_t>(k)].name);
+    CHECK(tlm.psi_rho(0, k) == Approx(difference).epsilon(allowed).margin(allowed * size));
+  }
+}
+
 // Two bars on hinges that swing between stops, with a torque that begins at a time and one that changes at an angle.
 Scene swinging_bars() {
   Scene s = double_pendulum();
@@ -274,52 +316,16 @@ Scene swinging_bars() {
   motor.components = {f("0"), f("0"), f("push*(1 + abs(t - ts)/(t - ts))/2 + l*abs(a - turn)/(a - turn)")};
   s.forces.push_back({"motor", motor});
   s.simulation.end_time = 1.2;
-  s.simulation.integrator.rtol = 1e-11, s.simulation.integrator.atol = 1e-12;
   return s;
 }
 
 }  // namespace
 
 TEST_CASE("gradients through many events are those of free runs, by both sweeps and with little memory", "[events]") {
-  Scene s = swinging_bars();
-  const auto [type, model] =
-      GENERATE(std::pair("dopri853", ModelChoice::planar), std::pair("dopri853", ModelChoice::spatial),
-               std::pair("radau5", ModelChoice::spatial));
-  s.simulation.integrator.type = type, s.simulation.model = model;
-  if (s.simulation.integrator.type == "radau5") s.simulation.integrator.rtol = 1e-9;
-  const VectorXd rho = nominal(s);
-  const Mechanism mechanism(s, rho);
   Cost cost;
   cost.terminal = std::make_shared<StateNorm>();
   cost.samples = {{0.7, std::make_shared<StateNorm>()}};
-  const std::vector<Cost> costs{cost};
-  const SimulationResult tlm = simulate_tlm(mechanism, s.simulation, costs);
-  INFO(tlm.message);
-  REQUIRE(tlm.ok());
-  CHECK(tlm.steps.events.size() > 4);
-  SimulationSettings small = s.simulation;
-  small.adjoint_memory_mib = 1e-3;
-  const double size = tlm.psi_rho.cwiseAbs().maxCoeff();
-  for (const SimulationSettings& settings : {s.simulation, small}) {
-    const SimulationResult adjoint = simulate_adjoint(mechanism, settings, costs);
-    REQUIRE(adjoint.ok());
-    CHECK((adjoint.psi_rho - tlm.psi_rho).cwiseAbs().maxCoeff() < 1e-10 * size);
-    if (settings.adjoint_memory_mib < 1) CHECK(adjoint.statistics.recomputed_steps > 0);
-  }
-  for (Eigen::Index k = 0; k < rho.size(); ++k) {
-    const double h = 1e-4 * std::max(std::abs(rho(k)), 0.1);
-    const auto psi = [&](double steps) {
-      VectorXd there = rho;
-      there(k) += steps * h;
-      const SimulationResult run = simulate(Mechanism(s, there), s.simulation, costs);
-      INFO(run.message);
-      REQUIRE(run.ok());
-      return run.psi(0);
-    };
-    const double difference = (8 * (psi(1) - psi(-1)) - (psi(2) - psi(-2))) / (12 * h);
-    INFO(s.parameters[static_cast<std::size_t>(k)].name);
-    CHECK(tlm.psi_rho(0, k) == Approx(difference).epsilon(2e-6).margin(2e-6 * size));
-  }
+  check_free_runs(swinging_bars(), cost, 1e-4, 2e-6);
 }
 
 namespace {
@@ -385,38 +391,7 @@ TEST_CASE("impacts of a chain have the gradients of free runs", "[events]") {
   wall.restitution = f("0.5");
   s.limits = {floor, wall};
   s.simulation.end_time = 1.1;
-  s.simulation.integrator.rtol = 1e-11, s.simulation.integrator.atol = 1e-12;
-  const auto [type, model] =
-      GENERATE(std::pair("dopri853", ModelChoice::planar), std::pair("dopri853", ModelChoice::spatial),
-               std::pair("radau5", ModelChoice::spatial));
-  s.simulation.integrator.type = type, s.simulation.model = model;
-  if (s.simulation.integrator.type == "radau5") s.simulation.integrator.rtol = 1e-9;
-  const VectorXd rho = nominal(s);
-  const Mechanism mechanism(s, rho);
   Cost cost;
   cost.terminal = cost.running = std::make_shared<StateNorm>();
-  const std::vector<Cost> costs{cost};
-  const SimulationResult tlm = simulate_tlm(mechanism, s.simulation, costs);
-  INFO(tlm.message);
-  REQUIRE(tlm.ok());
-  CHECK(tlm.statistics.impacts.size() >= 3);
-  SimulationSettings small = s.simulation;
-  small.adjoint_memory_mib = 1e-3;
-  const double size = tlm.psi_rho.cwiseAbs().maxCoeff();
-  for (const SimulationSettings& settings : {s.simulation, small}) {
-    const SimulationResult adjoint = simulate_adjoint(mechanism, settings, costs);
-    REQUIRE(adjoint.ok());
-    CHECK((adjoint.psi_rho - tlm.psi_rho).cwiseAbs().maxCoeff() < 1e-10 * size);
-  }
-  for (Eigen::Index k = 0; k < rho.size(); ++k) {
-    const double h = 1e-5 * std::max(std::abs(rho(k)), 0.1);
-    const auto psi = [&](double steps) {
-      VectorXd there = rho;
-      there(k) += steps * h;
-      return simulate(Mechanism(s, there), s.simulation, costs).psi(0);
-    };
-    const double difference = (8 * (psi(1) - psi(-1)) - (psi(2) - psi(-2))) / (12 * h);
-    INFO(s.parameters[static_cast<std::size_t>(k)].name);
-    CHECK(tlm.psi_rho(0, k) == Approx(difference).epsilon(5e-6).margin(5e-6 * size));
-  }
+  check_free_runs(s, cost, 1e-5, 5e-6);
 }
